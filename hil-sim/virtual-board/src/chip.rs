@@ -19,7 +19,7 @@ use crate::periph::uart::{self, Uart};
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::periph::{
     adc::Adc, analog::Comparators, crc::CrcUnit, dac::Dac, encoder::EncoderTimer, flash::Flash,
-    gpio::Gpio, iwdg::Iwdg, pwr::Pwr, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
+    gpio::Gpio, iwdg::Iwdg, pwr::Pwr, rcc, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
 };
 use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};
@@ -189,15 +189,14 @@ impl Chip {
         } else {
             keep! { self, old: debug halt tamp }
         }
-        old.rcc.flags |= Rcc::new(cause).flags;
+        old.rcc.flags |= rcc::flags_of(cause);
         keep! { self, old:
             now accesses instructions keep_blocks watched forgiving rules flash_cycles
             analog dc_link comparator_offset fault_pull_ohm fault_low damage clock_error reference_error
             pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers slow_adc.inputs grounded tim1.drop_update tim2.position
-            rcc.flags rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line gates
+            rcc.flags rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line gates tim5.captures
+            flash.bytes flash.torn flash.torn_code flash.operations flash.options
         }
-        self.tim5 = old.tim5.after_reset();
-        self.flash = old.flash.after_reset();
         self.follow_fault_pin();
         self.look_at_gates();
     }

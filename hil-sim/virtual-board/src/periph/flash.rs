@@ -50,13 +50,13 @@ defaults! {
         pub busy_until: u64,
         /// Lower half of a double word that is being programmed.
         half: Option<(u32, u32)>,
-        bytes: Vec<u8> = vec![0xff; SIZE],
+        pub(crate) bytes: Vec<u8> = vec![0xff; SIZE],
         /// Double words whose check code is wrong.
-        torn: Vec<bool> = vec![false; SIZE / 8],
+        pub(crate) torn: Vec<bool> = vec![false; SIZE / 8],
         /// Address of a double word of the code whose check code is wrong.
         pub bad_code: Option<u32>,
         /// Addresses in the code whose check code the boot loader has left wrong, because power failed.
-        torn_code: Range<u32> = 0..0,
+        pub(crate) torn_code: Range<u32> = 0..0,
         /// Double words of the last operation.
         changing: Range<usize> = 0..0,
         /// Number of operations since the beginning: double words programmed, pages erased.
@@ -69,18 +69,6 @@ defaults! {
 }
 
 impl Flash {
-    /// Returns the flash with the same contents after a reset.
-    pub fn after_reset(self) -> Self {
-        Self {
-            bytes: self.bytes,
-            torn: self.torn,
-            torn_code: self.torn_code,
-            operations: self.operations,
-            options: self.options,
-            ..Self::default()
-        }
-    }
-
     /// Returns the number of wait states.
     pub fn wait_states(&self) -> u32 {
         self.store.get(ACR) & 15

@@ -45,19 +45,18 @@ defaults! {
     }
 }
 
-impl Rcc {
-    /// Returns the state after a reset.
-    pub fn new(cause: Reset) -> Self {
-        let flags = match cause {
-            Reset::Power => BOR | PIN,
-            Reset::Pin => PIN,
-            Reset::Software => SFT | PIN,
-            Reset::Watchdog => IWDG | PIN,
-            Reset::Window => WWDG | PIN,
-        };
-        Self { flags, ..Self::default() }
+/// Returns the flags of a reset.
+pub fn flags_of(cause: Reset) -> u32 {
+    PIN | match cause {
+        Reset::Power => BOR,
+        Reset::Pin => 0,
+        Reset::Software => SFT,
+        Reset::Watchdog => IWDG,
+        Reset::Window => WWDG,
     }
+}
 
+impl Rcc {
     /// Returns the system clock, Hz.
     pub fn system_hz(&self) -> u64 {
         let oscillator = |select| if select == 3 { HSE_HZ } else { HSI_HZ };

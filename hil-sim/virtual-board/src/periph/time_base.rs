@@ -29,7 +29,7 @@ defaults! {
         store: Store = Store::of("TIM5"),
         /// Time at which the counter was 0.
         from: u64,
-        captures: Captures,
+        pub(crate) captures: Captures,
     }
 }
 
@@ -37,11 +37,6 @@ impl TimeBase {
     /// Accounts for a stop of its clock for some ticks.
     pub fn delay(&mut self, ticks: u64) {
         self.from += ticks;
-    }
-
-    /// Returns the timer after a reset, with the same oscillator.
-    pub fn after_reset(&self) -> Self {
-        Self { captures: self.captures, ..Self::default() }
     }
 
     /// Sets the ticks from one edge of the oscillator to the next; infinite stops it.
