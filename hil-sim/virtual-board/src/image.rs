@@ -150,8 +150,8 @@ impl Image {
             let at = address.checked_sub(segment.address)? as usize;
             segment.bytes.get(at..at + size as usize)
         });
-        let words = bytes.with_context(|| format!("{name} is not in the flash"))?.chunks_exact(4);
-        Ok(words.map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect())
+        let words = bytes.with_context(|| format!("{name} is not in the flash"))?.as_chunks().0;
+        Ok(words.iter().map(|word| u32::from_le_bytes(*word)).collect())
     }
 
     /// Returns every second address of the code: an instruction begins at each of them or at the one before.

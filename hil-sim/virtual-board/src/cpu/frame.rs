@@ -57,20 +57,17 @@ impl Cpu {
         if self.uc.mem_read(u64::from(sp), &mut frame[..size]).is_err() {
             return false;
         }
-        let word = |at: usize| {
-            let bytes = [frame[at], frame[at + 1], frame[at + 2], frame[at + 3]];
-            u64::from(u32::from_le_bytes(bytes))
-        };
-        let xpsr = word(0x1c) as u32;
+        let word = |n: usize| u32::from_le_bytes(frame.as_chunks().0[n]);
+        let xpsr = word(7);
         self.set_exception(xpsr & !(1 << 9));
         if float {
-            let values: [u64; 9] =
-                std::array::from_fn(|k| word(0x20 + 8 * k) | word(0x24 + 8 * k) << 32);
+            let doubles = frame[0x20..].as_chunks().0;
+            let values: [u64; 9] = std::array::from_fn(|k| u64::from_le_bytes(doubles[k]));
             self.uc.reg_write_batch(&FLOAT, &values, 9).ok();
         }
         let control = self.control() & !FPCA | if float { FPCA } else { 0 };
         self.uc.reg_write(R::CONTROL, control).ok();
-        let basic: [u64; 7] = std::array::from_fn(|k| word(4 * k));
+        let basic: [u64; 7] = std::array::from_fn(|k| word(k).into());
         self.uc.reg_write_batch(&BASIC[..6], &basic[..6], 6).ok();
         self.set(R::SP, sp.wrapping_add(size as u32).wrapping_add(4 * (xpsr >> 9 & 1)));
         self.set(R::PC, basic[6] as u32);

@@ -149,8 +149,7 @@ impl Flash {
     /// Returns a word of the stored part, and whether its check code is wrong.
     pub fn load(&mut self, address: u32) -> (u32, bool) {
         let at = (address - STORED) as usize & !3;
-        let word =
-            self.bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let word = self.bytes[at..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let torn = self.torn.get(at / 8) == Some(&true);
         if torn {
             self.note_error(address);
@@ -187,14 +186,14 @@ impl Flash {
     fn program(&mut self, address: u32, low: u32, high: u32, now: u64) {
         let at = (address - STORED) as usize;
         let new = u64::from(low) | u64::from(high) << 32;
-        let Some(place) = self.bytes.get_mut(at..at + 8) else { return };
-        let old = place.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte));
+        let Some(place) = self.bytes[at..].first_chunk_mut() else { return };
+        let old = u64::from_le_bytes(*place);
         // Only erased double words may be programmed, or any with all zeros.
         if old != u64::MAX && new != 0 {
             self.status |= PROGERR;
             return;
         }
-        place.copy_from_slice(&(old & new).to_le_bytes());
+        *place = (old & new).to_le_bytes();
         self.changing = at / 8..at / 8 + 1;
         self.torn[at / 8] = self.power_goes();
         self.busy_until = now + PROGRAM;
