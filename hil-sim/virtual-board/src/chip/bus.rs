@@ -127,7 +127,9 @@ impl Chip {
     }
 
     fn read_word(&mut self, address: u32) -> Option<u32> {
-        if self.is_clocked(address) { self.read_clocked(address) } else { self.at_reset(address) }
+        // A peripheral without its clock reads as after a reset.
+        let clocked = self.is_clocked(address);
+        if clocked { self.read_clocked(address) } else { Self::default().read_clocked(address) }
     }
 
     /// Reads a register of a peripheral whose clock is on, or of one without a clock of its own.

@@ -32,11 +32,6 @@ impl Chip {
         )
     }
 
-    /// Returns the reset value of a register of a peripheral that has no clock.
-    pub(super) fn at_reset(&self, address: u32) -> Option<u32> {
-        Self::default().read_clocked(address)
-    }
-
     /// Checks clock tree, voltage range and wait states against each other, after one of them was written.
     pub(super) fn check_clocks(&mut self) {
         let (system, bus) = (self.rcc.system_hz(), self.rcc.bus_hz());

@@ -68,12 +68,9 @@ pub fn analog(converter: usize, channel: u32) -> Option<Pin> {
 }
 
 impl Chip {
-    fn reaches(&self, signal: Signal) -> bool {
-        pins_of(signal).any(|((port, pin), af)| self.gpio[port].pad(pin) == Pad::Alternate(af))
-    }
-
     pub(super) fn require_pin(&mut self, signal: Signal, use_: &str) {
-        let reaches = self.reaches(signal);
+        let reaches =
+            pins_of(signal).any(|((port, pin), af)| self.gpio[port].pad(pin) == Pad::Alternate(af));
         self.rules.require(reaches, Rule::PinMode, || {
             format!("{use_}, but no pin is at the alternate function of {}", signal.0)
         });
@@ -95,13 +92,10 @@ impl Chip {
     /// Returns the duty at the pin of the brake chopper. If the pin is released, it is pulled down.
     pub fn chopper_duty(&self) -> f64 {
         let (duty, (port, pin)) = (self.tim8.duty(), CHOPPER_PIN);
-        if duty == 0.0 {
-            return 0.0;
-        }
-        let connected = pins_of(CHOPPER).any(|(place, function)| {
-            place == CHOPPER_PIN && self.gpio[port].pad(pin) == Pad::Alternate(function)
-        });
-        if connected && !self.stops_chopper() { duty } else { 0.0 }
+        let pad = self.gpio[port].pad(pin);
+        let connects = |(place, af)| place == CHOPPER_PIN && pad == Pad::Alternate(af);
+        let works = duty > 0.0 && !self.stops_chopper() && pins_of(CHOPPER).any(connects);
+        if works { duty } else { 0.0 }
     }
 
     /// Returns whether the pin of the precharge relay is high. If the pin is released, it is pulled down.
