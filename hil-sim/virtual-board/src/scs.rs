@@ -67,8 +67,6 @@ defaults! {
         pub cfsr: u32,
         /// Reasons of hard faults.
         pub hfsr: u32,
-        /// Address of a bus fault.
-        pub bfar: u32,
         plain: Store = Store::of("SCS"),
         /// Memory protection.
         pub mpu: Mpu,
@@ -194,7 +192,6 @@ impl Scs {
                 let left = self.systick.expires.saturating_sub(now);
                 (left / self.systick.cycle.max(1)) as u32 & 0xff_ffff
             }
-            0xe000_e01c => 0,
             0xe000_e100..0xe000_e110 | 0xe000_e180..0xe000_e190 => bits(self.enabled),
             0xe000_e200..0xe000_e210 | 0xe000_e280..0xe000_e290 => bits(self.pending),
             0xe000_e300..0xe000_e310 => {
@@ -205,7 +202,6 @@ impl Scs {
                 let four = self.priority.iter().skip(first_priority(address)).take(4);
                 four.rev().fold(0, |word, one| word << 8 | u32::from(*one))
             }
-            0xe000_ed00 => 0x410f_c241,
             0xe000_ed04 => {
                 let active = self.active.last().map_or(0, |e| u32::from(*e));
                 let pending = self.best().map_or(0, |(e, _)| u32::from(e));
@@ -216,9 +212,7 @@ impl Scs {
             0xe000_ed0c => 0xfa05_0000 | self.grouping << 8,
             0xe000_ed28 => self.cfsr,
             0xe000_ed2c => self.hfsr,
-            0xe000_ed38 => self.bfar,
             0xe000_ed90..0xe000_edbc => return self.mpu.read(address),
-            0xe000_edf0 => 0,
             0xe000_edfc => self.demcr,
             0xe000_1000 => 0x4000_0000 | self.dwt_control,
             0xe000_1004 => self.cycles(now),

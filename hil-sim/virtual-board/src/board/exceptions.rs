@@ -52,7 +52,7 @@ impl Board {
         chip.scs.cfsr |= cfsr;
         chip.scs.hfsr |= 1 << 30;
         if let Some(address) = address {
-            chip.scs.bfar = address;
+            chip.scs.write(0xe000_ed38, address, chip.now);
             chip.scs.cfsr |= 1 << 15;
         }
         self.enter(scs::HARD_FAULT)
@@ -99,8 +99,8 @@ impl Board {
             }
             Stop::Denied(address) => {
                 // MMFAR, MMARVALID and DACCVIOL.
-                let now = self.cpu.chip().now;
-                self.cpu.chip_mut().scs.write(0xe000_ed34, address, now);
+                let chip = self.cpu.chip_mut();
+                chip.scs.write(0xe000_ed34, address, chip.now);
                 self.hard_fault(1 << 7 | 1 << 1, None)?;
             }
             Stop::Instruction => self.hard_fault(1 << 16, None)?,
