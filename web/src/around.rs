@@ -4,9 +4,11 @@ use std::f64::consts::TAU;
 
 use induction_drive::boards::{ANALOG, CONTACTS, TERMINALS};
 use induction_drive::terminals::Contacts;
-use motor_plant::{
-    Channel, CurrentFault, Load, MachineSettings, Plant, PlantError, SaliencySettings,
-};
+use motor_plant::{Channel, CurrentFault, Load, MachineSettings, Plant, SaliencySettings};
+
+/// The allowed words.
+const WORDS: &str = "load locked, load free NM, load speed RPM, turn DEG, open a|b|c|none, saliency \
+                     SHARE, warm PERCENT, sensor a|b none|open|high|low, dc VOLT, strip CONTACT ...";
 
 /// Changes the plant as requested by these words.
 ///
@@ -24,35 +26,30 @@ use motor_plant::{
 /// The error, and the allowed words.
 pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
     let words: Vec<&str> = words.split_whitespace().collect();
-    let refused = |why: PlantError| why.to_string();
-    let number = |word: &str| -> Result<f64, String> {
-        let value: Option<f64> = word.parse().ok();
-        value
-            .filter(|value| value.is_finite())
-            .ok_or_else(|| format!("{word}: a number is expected"))
+    let number = |word: &str| {
+        let value = word.parse().ok().filter(|value: &f64| value.is_finite());
+        value.ok_or_else(|| format!("{word}: a number is expected"))
     };
-    match words[..] {
-        ["load", "locked"] => plant.set_load(Load::Locked).map_err(refused),
-        ["load", "free", nm] => plant.set_load(Load::Free { torque: number(nm)? }).map_err(refused),
-        ["load", "speed", rpm] => {
-            plant.set_load(Load::Speed { speed: number(rpm)? * TAU / 60.0 }).map_err(refused)
-        }
+    let done = match words[..] {
+        ["load", "locked"] => plant.set_load(Load::Locked),
+        ["load", "free", nm] => plant.set_load(Load::Free { torque: number(nm)? }),
+        ["load", "speed", rpm] => plant.set_load(Load::Speed { speed: number(rpm)? * TAU / 60.0 }),
         ["turn", degrees] => {
             plant.turn_rotor_flux(number(degrees)?.to_radians());
             Ok(())
         }
         ["open", phase] => {
             let phases = [("none", None), ("a", Some(0)), ("b", Some(1)), ("c", Some(2))];
-            plant.set_open_phase(named(phase, &phases)?).map_err(refused)
+            plant.set_open_phase(named(phase, &phases)?)
         }
         ["saliency", share] => {
             let (share, own) = (number(share)?, SaliencySettings::DEFAULT);
             let s = SaliencySettings { a_psi: share * own.a_psi, b1: share * own.b1, ..own };
-            plant.set_saliency(&MachineSettings::DEFAULT, &s).map_err(refused)
+            plant.set_saliency(&MachineSettings::DEFAULT, &s)
         }
         ["warm", percent] => {
             let (own, factor) = (MachineSettings::DEFAULT, 1.0 + number(percent)? / 100.0);
-            plant.set_resistances(own.rs * factor, own.rr * factor).map_err(refused)
+            plant.set_resistances(own.rs * factor, own.rr * factor)
         }
         ["sensor", channel, fault] => {
             let channel = named(channel, &[("a", Channel::A), ("b", Channel::B)])?;
@@ -65,11 +62,10 @@ pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
             plant.set_current_fault(channel, named(fault, &faults)?);
             Ok(())
         }
-        ["dc", volts] => plant.set_dc_link(number(volts)?).map_err(refused),
-        _ => Err("load locked, load free NM, load speed RPM, turn DEG, open a|b|c|none, saliency \
-                  SHARE, warm PERCENT, sensor a|b none|open|high|low, dc VOLT, strip CONTACT ..."
-            .to_owned()),
-    }
+        ["dc", volts] => plant.set_dc_link(number(volts)?),
+        _ => return Err(WORDS.to_owned()),
+    };
+    done.map_err(|why| why.to_string())
 }
 
 /// The contacts of the terminal strip with these names.
