@@ -7,37 +7,29 @@ use crate::chip::TICKS_PER_S;
 use crate::chip::debugger::{LOW_POWER, TIM5_STOP, WATCHDOG_STOPS};
 use crate::periph::plain::{DBG_APB1_FZ, DBG_CR};
 
-/// A program at the debug port, characterised by its effect on DBGMCU when it attaches. All of them keep the port alive
-/// in low-power modes.
+/// A program at the debug port, with the peripherals of APB1 that it stops by DBGMCU while the core is halted. All of
+/// them keep the port alive in low-power modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
 pub enum Debugger {
     /// probe-rs.
-    ProbeRs,
+    ProbeRs = 0,
     /// OpenOCD with `target/stm32g4x.cfg`, event `examine-end`: it stops both watchdogs while the core is halted.
-    OpenOcd,
+    OpenOcd = WATCHDOG_STOPS,
     /// ST's server with its option that suspends the watchdogs; as the worst case it is assumed to stop TIM5 as well.
-    StServer,
+    StServer = WATCHDOG_STOPS | TIM5_STOP,
 }
 
 impl Debugger {
     /// All debuggers.
     pub const ALL: [Self; 3] = [Self::ProbeRs, Self::OpenOcd, Self::StServer];
-
-    /// Returns the peripherals of APB1 that it stops while the core is halted.
-    const fn stops(self) -> u32 {
-        match self {
-            Self::ProbeRs => 0,
-            Self::OpenOcd => WATCHDOG_STOPS,
-            Self::StServer => WATCHDOG_STOPS | TIM5_STOP,
-        }
-    }
 }
 
 impl Board {
     /// Attaches a debugger.
     pub fn attach(&mut self, debugger: Debugger) {
         let debug = &mut self.chip().debug;
-        for (register, bits) in [(DBG_CR, LOW_POWER), (DBG_APB1_FZ, debugger.stops())] {
+        for (register, bits) in [(DBG_CR, LOW_POWER), (DBG_APB1_FZ, debugger as u32)] {
             let old = debug.get(register);
             debug.write(register, old | bits);
         }
