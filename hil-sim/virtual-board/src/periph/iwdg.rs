@@ -1,9 +1,10 @@
 //! The independent watchdog (RM0440, section 42).
 
-use super::{Effect, NEVER};
+use super::{Effect, NEVER, Store, offsets};
 use crate::rules::{Rule, Rules};
 use crate::time::TICKS_PER_S;
 
+offsets! { PR = 0x04, RLR = 0x08, SR = 0x0c, WINR = 0x10 }
 /// Frequency of the LSI oscillator, which clocks the watchdog, Hz (datasheet, typical).
 pub const LSI_HZ: f64 = 32_000.0;
 /// Largest number of clocks until a written value takes effect.
@@ -13,9 +14,7 @@ defaults! {
     /// The watchdog.
     #[derive(Clone, Debug)]
     pub struct Iwdg {
-        prescaler: u32,
-        reload: u32 = 0xfff,
-        window: u32 = 0xfff,
+        store: Store = Store::of("IWDG"),
         unlocked: bool,
         /// Whether these are clocks of the oscillator (RM0440, IWDG_SR) and not prescaled ones, which ST's driver allows for.
         pub quick: bool,
@@ -34,12 +33,12 @@ impl Iwdg {
     }
 
     fn period(&self) -> u64 {
-        u64::from(self.reload + 1) * self.count()
+        u64::from(self.store.get(RLR) + 1) * self.count()
     }
 
     /// Returns the ticks per prescaled clock.
     fn count(&self) -> u64 {
-        (4 << self.prescaler.min(6)) * self.clock
+        (4 << self.store.get(PR).min(6)) * self.clock
     }
 
     /// Accounts for a stop of its clock for some ticks.
@@ -49,14 +48,10 @@ impl Iwdg {
 
     /// Reads a register.
     pub fn read(&self, offset: u32, now: u64) -> Option<u32> {
-        Some(match offset {
-            0x00 => 0,
-            0x04 => self.prescaler,
-            0x08 => self.reload,
-            0x0c => (0..3).fold(0, |w, n| w | u32::from(now < self.busy_until[n]) << n),
-            0x10 => self.window,
-            _ => return None,
-        })
+        match offset {
+            SR => Some((0..3).fold(0, |w, n| w | u32::from(now < self.busy_until[n]) << n)),
+            _ => self.store.read(offset),
+        }
     }
 
     /// Writes a register.
@@ -70,8 +65,8 @@ impl Iwdg {
                     self.expires = now + self.period();
                 }
             }
-            0x04 | 0x08 | 0x10 if self.unlocked => {
-                let which = [0x04, 0x08, 0x10].iter().position(|known| *known == offset)?;
+            PR | RLR | WINR if self.unlocked => {
+                let which = [PR, RLR, WINR].iter().position(|known| *known == offset)?;
                 let name = ["PR", "RLR", "WINR"][which];
                 let idle = now >= self.busy_until[which];
                 if !rules.require(idle, Rule::IwdgBusy, || format!("IWDG_{name} while it is busy"))
@@ -79,13 +74,12 @@ impl Iwdg {
                     return Some(Effect::None);
                 }
                 let before = self.count();
-                *[&mut self.prescaler, &mut self.reload, &mut self.window][which] =
-                    value & [7, 0xfff, 0xfff][which];
+                self.store.write(offset, value);
                 // With the larger of the two prescalers, which gives the longest time.
                 let clock = if self.quick { self.clock } else { before.max(self.count()) };
                 self.busy_until[which] = now + ARRIVES * clock;
             }
-            0x04 | 0x08 | 0x10 => {}
+            PR | RLR | WINR => {}
             _ => return None,
         }
         Some(Effect::Look)

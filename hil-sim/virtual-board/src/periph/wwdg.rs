@@ -1,7 +1,8 @@
 //! The window watchdog (RM0440, section 43) on a bus clock of one tick a cycle. Its prescaler keeps running at any write.
 
-use super::{Effect, NEVER};
+use super::{Effect, NEVER, Store, offsets};
 
+offsets! { CR = 0x00, CFR = 0x04 }
 /// Cycles of the bus clock per count, before its own divider.
 const CLOCK: u64 = 4096;
 const WDGA: u32 = 1 << 7;
@@ -17,7 +18,7 @@ defaults! {
         /// The counter as it was written last, with WDGA, and the time of that write.
         control: u32 = COUNT,
         written: u64,
-        config: u32 = COUNT,
+        store: Store = Store::of("WWDG"),
         /// Time at which the counter runs out, or at which it was written outside the window.
         bites_at: u64 = NEVER,
     }
@@ -37,7 +38,7 @@ impl Wwdg {
 
     /// Returns the ticks per count.
     fn divider(&self) -> u64 {
-        CLOCK << (self.config >> 11 & 7)
+        CLOCK << (self.store.get(CFR) >> 11 & 7)
     }
 
     fn counter(&self, now: u64) -> u32 {
@@ -47,20 +48,18 @@ impl Wwdg {
 
     /// Reads a register.
     pub fn read(&self, offset: u32, now: u64) -> Option<u32> {
-        Some(match offset {
-            0x00 => self.control & WDGA | self.counter(now),
-            0x04 => self.config,
-            0x08 => 0,
-            _ => return None,
-        })
+        match offset {
+            CR => Some(self.control & WDGA | self.counter(now)),
+            _ => self.store.read(offset),
+        }
     }
 
     /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
         match offset {
-            0x00 => {
+            CR => {
                 let runs = self.control & WDGA != 0;
-                let early = runs && self.counter(now) > self.config & COUNT;
+                let early = runs && self.counter(now) > self.store.get(CFR) & COUNT;
                 let counts = u64::from(value & COUNT).saturating_sub(u64::from(LAST) - 1);
                 self.control = value & COUNT | (self.control | value) & WDGA;
                 self.written = now;
@@ -69,9 +68,7 @@ impl Wwdg {
                     self.bites_at = if early || counts == 0 { now } else { end };
                 }
             }
-            0x04 => self.config = value & 0x3a7f,
-            0x08 => {}
-            _ => return None,
+            _ => return self.store.write(offset, value).map(|_| Effect::Look),
         }
         Some(Effect::Look)
     }
