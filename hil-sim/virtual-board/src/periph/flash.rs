@@ -204,20 +204,19 @@ impl Flash {
         self.busy_until = now + ERASE;
         let number = (cr >> 3 & 0x7f) as usize;
         // Pages are counted from the beginning of a bank; with a single bank they are twice as long.
-        let (address, size) = match (self.options & DBANK != 0, cr & BKER != 0) {
-            (true, true) => (BANK_2 as usize + number * PAGE, PAGE),
-            (true, false) => (FLASH as usize + number * PAGE, PAGE),
-            (false, _) => (FLASH as usize + number * 2 * PAGE, 2 * PAGE),
+        let (bank, size) = match (self.options & DBANK != 0, cr & BKER != 0) {
+            (true, true) => (BANK_2, PAGE),
+            (true, false) => (FLASH, PAGE),
+            (false, _) => (FLASH, 2 * PAGE),
         };
-        let Some(start) = address.checked_sub(STORED as usize) else {
+        let Some(start) = (bank as usize + number * size).checked_sub(STORED as usize) else {
             // A page of the code.
             self.status |= PROGERR;
             return;
         };
         let lost = self.power_goes();
-        let range = start..start + size;
-        self.bytes[range.clone()].fill(0xff);
-        self.changing = range.start / 8..range.end / 8;
+        self.bytes[start..start + size].fill(0xff);
+        self.changing = start / 8..(start + size) / 8;
         self.torn[self.changing.clone()].fill(lost);
         self.status |= EOP;
     }
