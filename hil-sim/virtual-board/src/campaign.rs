@@ -19,6 +19,7 @@ use std::ops::RangeInclusive;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use clap::Args;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -47,34 +48,42 @@ type Runs = BTreeMap<usize, Vec<(u64, Result<Outcome>)>>;
 pub type Without = fn(&mut Board, &str, &str);
 
 /// The faults of a campaign.
-#[derive(Clone, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct Selection {
-    /// Their number.
+    /// Number of faults.
+    #[arg(default_value_t = 2000)]
     pub count: u64,
-    /// Seed of the first fault; each following one has the next selected seed.
+    // The next one that is selected.
+    /// Seed of the first fault; each following fault has the next one.
+    #[arg(default_value_t = 1)]
     pub seed: u64,
-    /// Restricts the campaign to classes whose name contains this text, or one of several texts separated by `|`.
+    // Or one of several texts separated by `|`.
+    /// Restricts the campaign to classes whose name contains this text.
+    #[arg(long, default_value = "")]
     pub class: String,
-    /// Speed of the shaft, rpm on four poles: 850 to 3500, where the angle comes from the observer alone. None: the
-    /// shaft is locked without the encoder, and at 300 and 900 rpm with it.
+    // With it the angle comes from the observer alone. Without it the shaft is locked without the encoder, and at 300
+    // and 900 rpm with it.
+    /// Speed of the shaft, rpm on four poles: 850 to 3500.
+    #[arg(long)]
     pub rpm: Option<f64>,
-    /// Assignments `KEY=VALUE` to the configuration.
+    /// An assignment KEY=VALUE to the configuration; repeatable.
+    #[arg(long)]
     pub set: Vec<String>,
-    /// The power stage for which the image was built.
-    pub stage: &'static PowerStage,
-    /// Changes that remove protections, to check that their classes then fail. All faults are injected once with each of them.
-    pub without: Vec<Without>,
 }
 
-/// Runs a fault campaign; `open` opens the image. Returns for each change the table, or an error with the table and its failures.
+/// Runs a fault campaign on a power stage; `open` opens its image. All faults are injected once with each change of
+/// `without`, which remove protections to check that their classes then fail. Returns for each change the table, or an
+/// error with the table and its failures.
 ///
 /// # Errors
 /// A board does not start, or no class has that name.
 pub fn run(
     open: impl Fn() -> Result<Image> + Sync,
+    stage: &'static PowerStage,
     selection: &Selection,
+    without: &[Without],
 ) -> Result<Vec<Result<String>>> {
-    let Selection { count, seed, ref class, rpm, ref set, stage, ref without } = *selection;
+    let Selection { count, seed, ref class, rpm, ref set } = *selection;
     let all = Class::all(rpm.is_some());
     let classes = all.len() as u64;
     let chosen = |one: &Class| class.split('|').any(|part| one.name.contains(part));

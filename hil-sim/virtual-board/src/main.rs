@@ -15,21 +15,8 @@ enum Task {
     Campaign {
         /// The ELF.
         elf: PathBuf,
-        /// Number of faults.
-        #[arg(default_value_t = 2000)]
-        count: u64,
-        /// Seed of the first fault; each following fault has the next one.
-        #[arg(default_value_t = 1)]
-        seed: u64,
-        /// Restricts the campaign to classes whose name contains this text.
-        #[arg(long, default_value = "")]
-        class: String,
-        /// Speed of the shaft, rpm on four poles: 850 to 3500.
-        #[arg(long)]
-        rpm: Option<f64>,
-        /// An assignment KEY=VALUE to the configuration; repeatable.
-        #[arg(long)]
-        set: Vec<String>,
+        #[command(flatten)]
+        selection: campaign::Selection,
         /// The board for which the ELF was built, with a motor that suits it.
         #[arg(long, default_value = REFERENCE.name)]
         board: String,
@@ -68,12 +55,11 @@ fn main() -> ExitCode {
 
 fn run(task: Task) -> Result<()> {
     match task {
-        Task::Campaign { elf, count, seed, class, rpm, set, board } => {
+        Task::Campaign { elf, selection, board } => {
             let stage = PowerStage::named(&board)?;
-            let without: Vec<campaign::Without> = vec![|_, _, _| ()];
-            let selection = campaign::Selection { count, seed, class, rpm, set, stage, without };
-            println!("{}", campaign::bounds(rpm.is_some()));
-            for table in campaign::run(|| Image::open(&elf), &selection)? {
+            println!("{}", campaign::bounds(selection.rpm.is_some()));
+            let open = || Image::open(&elf);
+            for table in campaign::run(open, stage, &selection, &[|_, _, _| ()])? {
                 println!("{}", table?);
             }
         }

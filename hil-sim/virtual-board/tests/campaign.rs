@@ -87,10 +87,9 @@ fn a_class_fails_without_its_protection() -> Result<()> {
     let class = PROTECTED.map(|(name, _)| name).join("|");
     // Four of each class: some bits affect nothing, and without the encoder another protection detects a wrong crystal.
     let count = 4 * PROTECTED.len() as u64;
-    let (rpm, set, stage) = (None, Vec::new(), &REFERENCE);
-    let both: Vec<Without> = vec![|_, _, _| (), without];
-    let selection = Selection { count, seed: 7000, class, rpm, set, stage, without: both };
-    let mut tables = campaign::run(Image::built, &selection)?;
+    let both: [Without; 2] = [|_, _, _| (), without];
+    let selection = Selection { count, seed: 7000, class, rpm: None, set: Vec::new() };
+    let mut tables = campaign::run(Image::built, &REFERENCE, &selection, &both)?;
     let why = tables.remove(1).expect_err("nothing fails without protection").to_string();
     println!("{}", tables.remove(0)?);
     for (class, _) in PROTECTED {
