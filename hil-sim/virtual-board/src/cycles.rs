@@ -158,8 +158,7 @@ fn identification(image: Image) -> Result<Row> {
 
 fn sensorless(image: Image) -> Result<Row> {
     let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     let orders = ["torque 1", "torque 2", "torque -2", "torque 9", "torque 0"];
     regulate(&mut pair, "sensorless", &orders)
 }

@@ -105,6 +105,15 @@ impl Pair {
         }
     }
 
+    /// Starts, and runs until the drive regulates torque.
+    ///
+    /// # Errors
+    /// As [`Pair::order`].
+    pub fn start_torque(&mut self) -> Result<()> {
+        self.order("start torque")?;
+        self.until_state(State::Torque)
+    }
+
     /// Runs until the drive is in this state.
     ///
     /// # Errors

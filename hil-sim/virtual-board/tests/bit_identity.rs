@@ -66,8 +66,7 @@ fn a_drive_with_a_quiet_carrier_is_the_same() -> Result<()> {
 }
 
 fn with_pulses(pair: &mut Pair, carrier_khz: Carrier) -> Result<()> {
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     let pulse = u64::from(pair.board.chip().tim1.period());
     let period = pulse * u64::from(carrier_khz.pulses());
     assert_eq!(period, 28_332, "{carrier_khz:?}");

@@ -33,8 +33,7 @@ fn pair(stage: &'static PowerStage) -> Result<Pair> {
 }
 
 fn start(pair: &mut Pair) -> Result<()> {
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     assert!(pair.board.gates().any_on());
     Ok(())
 }

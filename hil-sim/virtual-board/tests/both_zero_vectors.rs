@@ -23,8 +23,7 @@ struct Cycles {
 
 /// A start without a sensor, torque in both directions, and a stop: the true torque is the commanded one, within 5 %.
 fn torque(pair: &mut Pair) -> Result<Cycles> {
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     let settings = pair.shadow.settings();
     let per_ampere = f64::from(settings.motor.torque_per_ampere(settings.i_d()));
     let mut most = Cycles::default();
@@ -96,8 +95,7 @@ fn regulating(seed: u64) -> Result<Pair> {
     let options = Options::new(&config, seed).set_up(&config)?;
     let mut pair = Pair::new(Image::built()?, options)?;
     assert!(pair.shadow.settings().scales.both_zero_vectors);
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     Ok(pair)
 }
 

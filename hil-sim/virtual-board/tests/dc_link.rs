@@ -144,8 +144,7 @@ fn every_end_takes_the_chopper_off() -> Result<()> {
 
 /// Brakes at a stiff link of 385 V; returns the share of time for which the chopper conducts.
 fn brakes(pair: &mut Pair) -> Result<f64> {
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     pair.board.plant.set_dc_link(385.0)?;
     pair.run(600, |_, _| {})?;
     Ok(pair.board.chip().chopper_duty())
@@ -245,8 +244,7 @@ fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
     println!("closed after {took:.3} s at {v:.1} V");
     // With 200 ohm the load of 5 W costs 3.3 V; 5 V of band and 0.3 s leave 5 / (e^3.2 - 1) V more.
     assert!(v > mains - 5.0 && took > 0.3, "{v} V after {took} s");
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     assert!(pair.board.chip().relay_pin());
     pair.order("stop")?;
     pair.until_state(State::Off)?;

@@ -60,8 +60,7 @@ fn what_is_learned_is_there_after_the_power_was_off() -> Result<()> {
     power_cycle(&mut pair)?;
     assert!(pair.shadow.firmware_settings().learned.is_some());
     assert_eq!(list(&mut pair, "learned")?, learned);
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     pair.order("torque 1")?;
     pair.run(3000, |_, _| {})?;
     Ok(())

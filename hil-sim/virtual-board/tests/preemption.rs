@@ -1,7 +1,6 @@
 //! Code that the control interrupt preempts continues undisturbed.
 
 use anyhow::{Context, Result};
-use drive_core::State;
 use hil_sim::Config;
 use induction_drive::board::CYCLES_PER_US;
 use rand::{RngExt, SeedableRng};
@@ -33,8 +32,7 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     options.counting = Counting { cycles: true, every_instruction: true };
     let mut pair = Pair::new(Image::built()?, options)?;
     pair.say("log debug")?;
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     let mut board = pair.board;
     board.take_log()?;
     board.poison = Some(Poison::new(board.image.symbol("_stack_start")?.address));

@@ -18,8 +18,7 @@ fn the_printed_chains_run_on_the_board_as_on_the_host() -> Result<()> {
         config.drive.injection.demodulator = demodulator;
         let options = Options::new(&config, seed).set_up(&config)?;
         let mut pair = Pair::new(Image::built_for("printed")?, options)?;
-        pair.order("start torque")?;
-        pair.until_state(State::Torque)?;
+        pair.start_torque()?;
         pair.board.longest = Default::default();
         pair.order("torque 1")?;
         pair.run(600, |_, _| {})?;

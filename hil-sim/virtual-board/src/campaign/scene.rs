@@ -147,7 +147,7 @@ impl Scene {
         pair.order(&format!("set {} {}", CHANGE.0, old.command.timeout_s))?;
         let off = [first, pair.board.keep()?];
         let settling = if rpm.is_some() { SETTLING_AT_SPEED } else { SETTLING };
-        started(&mut pair)?;
+        pair.start_torque()?;
         let mut held = 0.0;
         while held < rpm.unwrap_or(0.0) {
             held += STEP_RPM;
@@ -159,7 +159,7 @@ impl Scene {
         pair.order("angle encoder")?;
         let mut with_encoder = |rpm: &f64| {
             pair.board.plant.set_load(Load::Speed { speed: config.rpm(*rpm) * TAU / 60.0 })?;
-            started(&mut pair)?;
+            pair.start_torque()?;
             with_torques(&mut pair, &torques, settling)
         };
         let encoder = speeds.iter().map(&mut with_encoder).collect::<Result<_>>()?;
@@ -190,11 +190,6 @@ impl Scene {
     pub fn off(&mut self, slot: usize) -> Result<()> {
         self.board.go_back(&self.off[slot % 2])
     }
-}
-
-fn started(pair: &mut Pair) -> Result<()> {
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)
 }
 
 /// Takes a snapshot with each torque, then stops the drive.

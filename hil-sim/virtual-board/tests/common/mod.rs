@@ -4,7 +4,6 @@ pub mod program;
 pub mod script;
 
 use anyhow::{Result, bail};
-use drive_core::State;
 use hil_sim::Config;
 use virtual_board::{Board, Image, Options, Pair};
 
@@ -19,8 +18,7 @@ pub fn pair(config: &Config, seed: u64) -> Result<Pair> {
 /// Returns such a board that regulates torque without a sensor.
 pub fn regulating(seed: u64) -> Result<Pair> {
     let mut pair = pair(&Config::default(), seed)?;
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    pair.start_torque()?;
     Ok(pair)
 }
 
