@@ -9,13 +9,9 @@ use crate::{chip::CONTROL_INTERRUPT, memory, scs};
 impl Board {
     /// Takes the exception that is due.
     pub(super) fn exceptions(&mut self) -> Result<()> {
-        let (primask, basepri) = self.masks();
+        let [primask, basepri] = [Register::PRIMASK, Register::BASEPRI].map(|r| self.cpu.get(r));
         let Some(exception) = self.cpu.chip().scs.due(primask, basepri) else { return Ok(()) };
         self.enter(exception)
-    }
-
-    fn masks(&self) -> (u32, u32) {
-        (self.cpu.get(Register::PRIMASK), self.cpu.get(Register::BASEPRI))
     }
 
     fn enter(&mut self, exception: u16) -> Result<()> {

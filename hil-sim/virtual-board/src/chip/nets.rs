@@ -2,9 +2,10 @@
 //! the break of TIM1.
 
 use super::{Chip, Damage};
+use crate::periph::{NEVER, dac::Dac};
 use crate::power_stage::driver::{self, CHIP_PULL_OHM, CHIP_V, Pull};
 use crate::power_stage::{CODES, DcLinkPin, channel};
-use crate::{periph::NEVER, rules::Rule, time::TICKS_PER_S};
+use crate::{rules::Rule, time::TICKS_PER_S};
 
 /// The strongest of the chip's own pull resistors, ohm (datasheet, RPU and RPD: 25 to 55 kOhm).
 const STRONGEST_PULL_OHM: f64 = 25e3;
@@ -69,12 +70,12 @@ impl Chip {
         self.compare_now();
     }
 
-    /// Returns the DAC and channel whose level comparator 1 or 3, counted from 0, uses.
-    fn level_of(&self, n: usize) -> Option<(usize, usize)> {
+    /// Returns the DAC whose channel 1 gives the level of comparator 1 or 3, counted from 0.
+    fn level_of(&self, n: usize) -> Option<&Dac> {
         // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
         match self.comp.reference_of(n) {
-            4 => Some((1, 1)),
-            5 => Some((0, 1)),
+            4 => Some(&self.dac[1]),
+            5 => Some(&self.dac[0]),
             _ => None,
         }
     }
@@ -89,8 +90,7 @@ impl Chip {
         self.comp.inputs[0] = dc_link;
         self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
         for n in [0, 2] {
-            let level = self.level_of(n);
-            let code = level.map(|(which, channel)| self.dac[which].code(channel, self.now));
+            let code = self.level_of(n).map(|dac| dac.code(self.now));
             self.comp.references[n] = code.map_or(u16::MAX, |code| code + self.comparator_offset);
         }
         match self.damage {
@@ -107,13 +107,11 @@ impl Chip {
     /// Checks, after a write to a comparator, that the level it uses must have been seen ready.
     pub(super) fn check_reference(&mut self, offset: u32) {
         let n = ((offset - 0x200) / 4) as usize;
-        if let (true, Some((which, channel))) = (self.comp.is_on(n), self.level_of(n)) {
-            let (dac, comp) = (&self.dac[which], n + 1);
-            self.rules.require(dac.seen_ready(channel), Rule::DacReady, || {
-                let dac = dac.number;
-                format!("COMP{comp} is on, but DAC{dac}_SR.DAC{channel}RDY was never read as set")
-            });
-        }
+        let Some(dac) = self.level_of(n).filter(|_| self.comp.is_on(n)) else { return };
+        let (ready, number, comp) = (dac.seen_ready(), dac.number, n + 1);
+        self.rules.require(ready, Rule::DacReady, || {
+            format!("COMP{comp} is on, but DAC{number}_SR.DAC1RDY was never read as set")
+        });
     }
 
     /// Updates the level of the fault input (PA6), which follows from the resistors of the board and of the port. It is

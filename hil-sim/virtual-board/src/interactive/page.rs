@@ -28,15 +28,12 @@ pub fn outcome(config: &Config, session: &Session) -> Outcome {
     m.set("worst_interrupt_cycles", f64::from(record.worst_cycles));
     outcome.faults = faults(lines);
     outcome.figures.push(figure(record).events(events(lines)));
-    let text = |wanted: fn(Source) -> bool| {
-        let lines = lines.iter().filter(|line| wanted(line.source));
-        lines.map(|line| format!("{line}\n")).collect::<String>()
-    };
-    outcome.texts.push((
-        "Console: time (s), > typed, < said, # the board".into(),
-        text(|source| source != Source::Log),
-    ));
-    outcome.texts.push(("Log: time (s)".into(), text(|source| source == Source::Log)));
+    let texts =
+        [("Console: time (s), > typed, < said, # the board", false), ("Log: time (s)", true)];
+    for (title, is_log) in texts {
+        let lines = lines.iter().filter(|line| (line.source == Source::Log) == is_log);
+        outcome.texts.push((title.into(), lines.map(|line| format!("{line}\n")).collect()));
+    }
     outcome.remarks.push(
         "Torque, flux, speed and dc link are the simulated motor's and inverter's. References, measured \
          and estimated quantities are the drive's, read from its RAM while the outputs are on. \

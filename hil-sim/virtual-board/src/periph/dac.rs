@@ -56,14 +56,14 @@ impl Dac {
         Self { number, ..Self::default() }
     }
 
-    /// Returns the output of channel 1 or 2, counts.
-    pub fn code(&self, channel: usize, now: u64) -> u16 {
-        self.channels[channel - 1].output(now)
+    /// Returns the output of channel 1, counts.
+    pub fn code(&self, now: u64) -> u16 {
+        self.channels[0].output(now)
     }
 
-    /// Whether the program has read that a channel is ready.
-    pub fn seen_ready(&self, channel: usize) -> bool {
-        self.channels[channel - 1].seen_ready
+    /// Whether the program has read that channel 1 is ready.
+    pub fn seen_ready(&self) -> bool {
+        self.channels[0].seen_ready
     }
 
     /// Returns the time at which an output settles next.
