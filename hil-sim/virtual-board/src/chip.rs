@@ -18,7 +18,7 @@ use crate::periph::tim1::{Event, Tim1};
 use crate::periph::uart::{self, Uart};
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::periph::{
-    adc::Adc, analog::Comparators, crc::CrcUnit, dac::Dac, encoder::EncoderTimer, flash::Flash,
+    adc::Adc, analog::Comparator, crc::CrcUnit, dac::Dac, encoder::EncoderTimer, flash::Flash,
     gpio::Gpio, iwdg::Iwdg, pwr::Pwr, rcc, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
 };
 use crate::power_stage::{self, watch::GateWatch};
@@ -153,7 +153,7 @@ defaults! {
         /// Pins of each port that are connected to ground.
         pub grounded: [u32; 7],
         /// Comparators.
-        pub comp: Comparators,
+        pub comp: [Comparator; 7],
         /// Reference voltages of the comparators.
         pub dac: [Dac; 2] = [1, 3].map(Dac::new),
         /// Console.
@@ -253,7 +253,7 @@ impl Chip {
             if self.stops(WWDG_STOP) { NEVER } else { self.wwdg.next_event() },
             self.scs.systick.next_event(),
             self.rcc.next_event(),
-            self.comp.next_event(),
+            self.comp.iter().map(Comparator::next_event).fold(NEVER, u64::min),
             self.dac[0].next_event(self.now),
             self.dac[1].next_event(self.now),
             self.dc_link.next_event(),

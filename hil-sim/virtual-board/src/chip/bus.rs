@@ -157,7 +157,7 @@ impl Chip {
             IWDG => self.iwdg.read(offset, now),
             WWDG => self.wwdg.read(offset, now),
             SYSCFG => match offset {
-                0x200..0x220 => self.comp.read(offset - 0x200),
+                0x200..0x220 => Some(self.comp.get((offset - 0x200) as usize / 4)?.read()),
                 _ => self.syscfg.read(offset),
             },
             EXTI => self.exti.read(offset),
@@ -206,7 +206,7 @@ impl Chip {
             IWDG => self.iwdg.write(offset, value, rules)?,
             WWDG => self.wwdg.write(offset, value, now)?,
             SYSCFG => match offset {
-                0x200..0x220 => self.comp.write(offset - 0x200, value, now)?,
+                0x200..0x220 => self.comp.get_mut((offset - 0x200) as usize / 4)?.write(value, now),
                 _ => self.syscfg.write(offset, value)?,
             },
             EXTI => self.exti.write(offset, value)?,

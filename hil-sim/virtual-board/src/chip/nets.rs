@@ -73,7 +73,7 @@ impl Chip {
     /// Returns the DAC whose channel 1 gives the level of comparator 1 or 3, counted from 0.
     fn level_of(&self, n: usize) -> Option<&Dac> {
         // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
-        match self.comp.reference_of(n) {
+        match self.comp[n].reference_source() {
             4 => Some(&self.dac[1]),
             5 => Some(&self.dac[0]),
             _ => None,
@@ -87,27 +87,27 @@ impl Chip {
         for inputs in &mut self.adc.inputs {
             inputs[channel::DC_LINK] = dc_link;
         }
-        self.comp.inputs[0] = dc_link;
-        self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
+        self.comp[0].input = dc_link;
+        self.comp[2].input = if self.comp[2].input_pin() == 0 { current_a } else { current_b };
         for n in [0, 2] {
             let code = self.level_of(n).map(|dac| dac.code(self.now));
-            self.comp.references[n] = code.map_or(u16::MAX, |code| code + self.comparator_offset);
+            self.comp[n].reference = code.map_or(u16::MAX, |code| code + self.comparator_offset);
         }
         match self.damage {
-            Some(Damage::Level(code)) => self.comp.references[0] = code,
-            Some(Damage::Input) => self.comp.inputs[0] = 0,
+            Some(Damage::Level(code)) => self.comp[0].reference = code,
+            Some(Damage::Input) => self.comp[0].input = 0,
             Some(Damage::Comparator | Damage::Break) | None => {}
         }
-        self.comp.stuck_low = self.damage == Some(Damage::Comparator);
-        self.comp.look(self.now);
+        self.comp[0].stuck_low = self.damage == Some(Damage::Comparator);
+        self.comp.iter_mut().for_each(|comparator| comparator.look(self.now));
         let reaches = self.damage != Some(Damage::Break);
-        self.tim1.set_comparators(std::array::from_fn(|n| reaches && self.comp.output(n)));
+        self.tim1.set_comparators(std::array::from_fn(|n| reaches && self.comp[n].output()));
     }
 
     /// Checks, after a write to a comparator, that the level it uses must have been seen ready.
     pub(super) fn check_reference(&mut self, offset: u32) {
         let n = ((offset - 0x200) / 4) as usize;
-        let Some(dac) = self.level_of(n).filter(|_| self.comp.is_on(n)) else { return };
+        let Some(dac) = self.level_of(n).filter(|_| self.comp[n].is_on()) else { return };
         let (ready, number, comp) = (dac.seen_ready(), dac.number, n + 1);
         self.rules.require(ready, Rule::DacReady, || {
             format!("COMP{comp} is on, but DAC{number}_SR.DAC1RDY was never read as set")
