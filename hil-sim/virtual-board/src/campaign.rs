@@ -150,10 +150,9 @@ fn failure(class: &Class, end: &Result<Outcome>) -> Option<String> {
     let bound = if class.bound.0.is_finite() { class.bound.0 } else { 0.0 };
     match end {
         Err(why) => Some(format!("{why:#}")),
-        Ok(end) if end.wrong_ms > bound => {
-            Some(format!("wrong for {:.2} ms: {end:?}", end.wrong_ms))
+        Ok(end) => {
+            (end.wrong_ms > bound).then(|| format!("wrong for {:.2} ms: {end:?}", end.wrong_ms))
         }
-        Ok(_) => None,
     }
 }
 

@@ -85,6 +85,8 @@ fn both() -> Vec<Source> {
 const PERIOD_MS: f64 = 1.0 / 6.0;
 const TIM1_CR1: u32 = 0x4001_2c00;
 const OVERRUN_MS: f64 = 2.0;
+/// Characters of a flood of text at the console.
+const TEXT: &[u8; 20] = b"stausorquepi \n0123.-";
 
 impl Class {
     /// Returns the classes of a campaign with their bounds, at speed or not.
@@ -215,11 +217,7 @@ impl Class {
                 let mut bytes = vec![0; rng.random_range(1..3000)];
                 let text = rng.random::<bool>();
                 for byte in &mut bytes {
-                    *byte = if text {
-                        b"stausorquepi \n0123.-"[rng.random_range(0..20_usize)]
-                    } else {
-                        rng.random()
-                    };
+                    *byte = if text { TEXT[rng.random_range(0..TEXT.len())] } else { rng.random() };
                 }
                 board.send(&bytes);
                 format!("{} bytes{}", bytes.len(), if text { " of text" } else { "" })
