@@ -288,6 +288,7 @@ const OVER_VOLTAGE_SHARE: f32 = 1.075;
 /// The protection that works without the control step. It is set up at start from the settings in force then, and holds
 /// until the next reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "coefficients", derive(serde::Deserialize, serde::Serialize))]
 pub struct Protection {
     /// Lowest and highest ADC counts of current a that do not trip its analog watchdog.
     pub window_a: (u16, u16),

@@ -14,7 +14,7 @@ pub mod line;
 mod list;
 mod number;
 mod reply;
-mod restore;
+pub mod restore;
 mod status;
 mod stream;
 mod suggest;

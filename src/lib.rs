@@ -9,6 +9,8 @@ pub mod board;
 pub mod boards;
 #[cfg(target_os = "none")]
 pub mod chip;
+#[cfg(feature = "coefficients")]
+pub mod coefficients;
 pub mod commissioning;
 pub mod console;
 pub mod desk;

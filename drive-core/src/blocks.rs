@@ -8,12 +8,12 @@ macro_rules! block {
     ($(#[$doc:meta])* $name:ident, $feature:literal) => {
         $(#[$doc])*
         #[cfg(feature = $feature)]
-        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         pub struct $name(());
 
         $(#[$doc])*
         #[cfg(not(feature = $feature))]
-        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         pub enum $name {}
 
         impl $name {

@@ -157,7 +157,7 @@ impl DcLinkLimits {
 }
 
 /// Coefficients of the chopper.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Chopper {
     on: f32,
     per_band: f32,
@@ -170,7 +170,7 @@ struct Chopper {
 }
 
 /// Coefficients of the limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DcLink {
     /// Band of the voltage in which generating torque is limited.
     band: (f32, f32),

@@ -10,8 +10,7 @@ macro_rules! faults {
         ///
         /// A code never changes its meaning and is never used again. Codes below 64 belong to the
         /// drive, codes of 64 and above to the firmware around it.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[repr(u8)]
         #[non_exhaustive]

@@ -23,7 +23,7 @@ pub use tracker::Axis;
 pub use volts_per_hertz::{VoltsPerHertz, VoltsPerHertzSettings};
 
 /// Source of the flux angle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum AngleSource {
     /// Encoder and slip, Eq. 2.10.
     Encoder,

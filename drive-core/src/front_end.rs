@@ -18,7 +18,7 @@ use crate::protect::HeatSink;
 use shunts::{ShuntState, Shunts};
 
 /// Coefficients of the front end.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FrontEnd {
     /// Calibration of current a, A, from the ADC counts of a [`Sample`].
     pub current_a: Line,

@@ -1,7 +1,7 @@
 //! Scales of the ADCs.
 
 /// Calibration line of one channel: `value = gain * code + offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Line {
     /// Units per ADC count.
     pub gain: f32,

@@ -71,7 +71,7 @@ pub struct Ramps {
 }
 
 /// Coefficients of the loops. Speeds are in mechanical turns/s, positions in mechanical turns.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Motion {
     /// Speed controller, A per turn/s.
     pub pi: Pi,

@@ -8,7 +8,7 @@
 use core::num::NonZeroU32;
 
 /// Coefficients of the relay.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Relay {
     /// Voltage below which the relay opens, V.
     least_v: f32,

@@ -6,7 +6,7 @@ pub const POINTS: usize = 16;
 const STEPS: f32 = 14.0;
 
 /// The q-axis currents of the points: 0, a step, two steps, and so on.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Grid {
     step_a: f32,
     per_step: f32,
@@ -50,7 +50,7 @@ impl Grid {
 
 /// Values over the q-axis current at the points of a grid, of one of three kinds: [`ReferenceTable`], [`CarrierTable`] or
 /// [`SlopeTable`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Table<const KIND: u8> {
     grid: Grid,
     values: [f32; POINTS],

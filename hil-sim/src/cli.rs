@@ -13,6 +13,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::board;
+use crate::coefficients;
 use crate::console;
 use crate::experiments;
 use crate::first_light;
@@ -116,6 +117,10 @@ enum Command {
     /// and writes its pages, reads them back, starts it and compares its check sum. Exit code 2 if file, port or drive
     /// are refused.
     Update(console::update::Options),
+    /// Design the coefficients of a drive for the image `drive-and-log`, and write them beside it
+    ///
+    /// That image has no console and no design. Prints how to write image and coefficients through a debug probe.
+    Coefficients(coefficients::Options),
     /// Power up a board for the first time, step by step: tells you what to do and measure, talks to the drive, judges,
     /// and stops on doubt
     ///
@@ -155,6 +160,7 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Passport(options)) => passport::run(&options).and_then(say),
         Some(Command::Board(options)) => board::become_board(&options),
+        Some(Command::Coefficients(options)) => coefficients::run(&options).and_then(say),
         Some(Command::Console(options)) => console::run(&options),
         Some(Command::Update(options)) => console::update::run(&options),
         Some(Command::FirstLight(options)) => first_light::run(&options),

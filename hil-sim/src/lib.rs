@@ -4,6 +4,7 @@
 
 pub mod board;
 pub mod cli;
+mod coefficients;
 pub mod console;
 pub mod experiments;
 pub mod first_light;

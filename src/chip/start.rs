@@ -50,8 +50,9 @@ global_asm!(
     "ldr r0, ={rcc}; ldr r1, [r0, #0x48]; orr r1, #0x1000; str r1, [r0, #0x48]; ldr r1, [r0, #0x48]",
     "ldr r0, ={crc}; movs r1, #0xe1; str r1, [r0, #8]",
     "ldr r2, =__pieces; ldr r12, =__check",
-    ".Lpiece: ldm r2!, {{r3, r4}}",
-    ".Lsum: ldr r1, [r3], #4; str r1, [r0]; cmp r3, r4; bne .Lsum",
+    ".Lpiece: ldm r2!, {{r3, r4}}; b .Lnext", // a piece may be empty
+    ".Lsum: ldr r1, [r3], #4; str r1, [r0]",
+    ".Lnext: cmp r3, r4; bne .Lsum",
     "cmp r2, r12; bne .Lpiece",
     // An error of the flash raises its interrupt before the next line.
     "dsb; isb",

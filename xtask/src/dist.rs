@@ -102,7 +102,7 @@ pub fn dist(options: &Dist) -> Result<()> {
 /// Builds the programs for this machine into a folder.
 fn programs(host: &str, folder: &Path) -> Result<()> {
     let mut command = run::cargo("build --locked --profile");
-    command.args([run::SHIPPED, &paths::option(host, &[])?]);
+    command.args([run::SHIPPED, &paths::option(host)?]);
     command.args(PROGRAMS.map(|name| format!("--package={name}")));
     run::step("programs", run::plain(&mut command))?;
     PROGRAMS.iter().try_for_each(|name| {

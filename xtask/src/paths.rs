@@ -29,13 +29,12 @@ pub fn cargo_home() -> Result<PathBuf> {
     }
 }
 
-/// An option of cargo that makes the compiler for a target write the short names, and gives it further flags. It adds to the flags of the
-/// target in `.cargo/config.toml`; environment variables would replace these.
-pub fn option(target: &str, more: &[&str]) -> Result<String> {
-    let mut flags: Vec<String> = more.iter().map(|&flag| flag.to_owned()).collect();
-    for (long, short) in short_names()? {
-        flags.push(format!("--remap-path-prefix={}={short}", long.display()));
-    }
+/// An option of cargo that makes the compiler for a target write the short names. It adds to the flags of the target in
+/// `.cargo/config.toml`; environment variables would replace these.
+pub fn option(target: &str) -> Result<String> {
+    let flag =
+        |(long, short): (PathBuf, _)| format!("--remap-path-prefix={}={short}", long.display());
+    let flags: Vec<String> = short_names()?.into_iter().map(flag).collect();
     // The debug format of a list of strings is TOML.
     Ok(format!("--config=target.{target}.rustflags={flags:?}"))
 }

@@ -19,7 +19,7 @@ pub fn wheels() -> Result<Vec<PathBuf>> {
 /// Builds the wheel of this version into `target/wheels`, and the program that it is compared with, and runs the tests.
 pub fn test() -> Result<()> {
     let host = run::output("rustc", &["--print", "host-tuple"])?;
-    let options = ["--locked", "--profile", run::SHIPPED, &paths::option(&host, &[])?];
+    let options = ["--locked", "--profile", run::SHIPPED, &paths::option(&host)?];
     run::step("program", run::plain(&mut run::cargo("build --package hil-sim")).args(options))?;
     wheels()?.iter().try_for_each(fs::remove_file)?;
     let mut build = environment("build", &["maturin==1.16.0"])?;

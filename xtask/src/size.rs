@@ -44,6 +44,7 @@ pub fn report(elf: &Path, name: &str) -> Result<()> {
     let bank = |bank: Region| sum(&sections, |section| bank.takes(section));
     let image = fs::read(elf).with_context(|| elf.display().to_string())?;
     run::limit("control code", named(&[".ccm"]), budgets.control_code, "bytes")?;
+    run::limit("flash", bank(Region::bank(0)) + bank(Region::bank(1)), budgets.flash, "bytes")?;
     run::limit("first bank of the flash", bank(Region::bank(0)), budgets.flash_bank, "bytes")?;
     run::limit("second bank of the flash", bank(Region::bank(1)), budgets.flash_bank, "bytes")?;
     let ram = ram.saturating_sub(trace);

@@ -57,8 +57,7 @@ impl Target {
     /// A cargo command for the microcontroller, in the profile of the image.
     pub fn cargo(&self, subcommand: &str) -> Result<Command> {
         let mut command = self.bare(subcommand);
-        let map = format!("-Clink-arg=-Map={}", self.image()?.with_extension("map").display());
-        command.args(["--profile", PROFILE, "--target", TARGET, &paths::option(TARGET, &[&map])?]);
+        command.args(["--profile", PROFILE, "--target", TARGET, &paths::option(TARGET)?]);
         command.arg("--target-dir").arg(self.target_dir()?);
         Ok(command)
     }
@@ -69,13 +68,13 @@ impl Target {
         let mut command = self.with_library("rustc", "std,panic_abort");
         command.args(["--lib", "--crate-type", "cdylib"]);
         command.args(["--profile", "web", "--target", BROWSER, "--package", package]);
-        command.arg(paths::option(BROWSER, &[])?).arg("--target-dir").arg(self.target_dir()?);
+        command.arg(paths::option(BROWSER)?).arg("--target-dir").arg(self.target_dir()?);
         run::step("library for a browser", &mut command)?;
         let name = package.replace('-', "_") + ".wasm";
         Ok(self.target_dir()?.join(BROWSER).join("web").join(name))
     }
 
-    /// The image that this compiler builds; the linker's map lies beside it.
+    /// The full image that this compiler builds.
     pub fn image(&self) -> Result<PathBuf> {
         Ok(self.target_dir()?.join(TARGET).join(PROFILE).join("induction-drive"))
     }

@@ -16,7 +16,7 @@ use crate::carrier::Saliency;
 use crate::{SQRT_3, UnitVector};
 
 /// The learned numbers, dimensionless; 0 without an asymmetry.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Asymmetry {
     /// Part of q that does not change with the angle.
     pub constant: f32,

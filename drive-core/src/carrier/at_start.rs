@@ -23,7 +23,7 @@ const SETTLE_S: f32 = 0.02;
 const AVERAGE_S: f32 = 0.24;
 const LEARNING_S: f32 = 0.96;
 /// Measurement at a start.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AtStart {
     /// Control periods in which a residual flux decays first.
     pub decay: u32,

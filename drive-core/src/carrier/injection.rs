@@ -30,7 +30,7 @@ pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
 const HALF_CHANGE: f32 = 0.324_919_7;
 
 /// Coefficients of the injection: the injected voltage and the currents that it causes, as phasors.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Injection {
     /// Amplitude of the voltage, V peak.
     pub amplitude: f32,

@@ -20,7 +20,7 @@ use crate::Abc;
 /// assert!((v.b + 0.5 * v.a).abs() < 0.001); // half of it at half of 30 mA
 /// assert_eq!(v.c, -v.a);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DeadTime {
     /// Lost share of the dc link: dead time / switching period.
     ratio: f32,

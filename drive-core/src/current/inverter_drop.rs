@@ -28,7 +28,7 @@ const RESISTANCE: (f32, f32) = (0.5, 2.0);
 const LARGEST: f32 = 0.05;
 
 /// Coefficients of the measurement.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct InverterDrop {
     /// Relative forcing current; 1 if the current limit or the time does not allow forcing.
     forced: f32,

@@ -22,7 +22,7 @@ const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
 /// assert_eq!(out.duties, [1.0, 0.0, 0.0]);
 /// assert!(out.limited && (out.realised.alpha - 207.33).abs() < 0.01);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Modulator {
     /// Shortest pulse, share of the period.
     shortest: f32,
@@ -33,7 +33,7 @@ pub struct Modulator {
 }
 
 /// The limit that keeps two of three legs readable.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Readable {
     /// Largest duty at which a leg can be read.
     duty: f32,

@@ -34,7 +34,7 @@ use crate::Dq;
 /// state.back_calculate(2.5 - 3.0); // the actuator was limited to 2.5
 /// assert_eq!(pi.step(&mut state, 1.0), 3.5);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Pi {
     /// Gain k_c, output unit per input unit (V/A in the current loop).
     pub k_c: f32,
@@ -102,7 +102,7 @@ impl PiState {
 }
 
 /// Coefficients of the current loop in the flux frame: one controller per axis, A peak to V peak.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DqPi {
     /// The d axis.
     pub d: Pi,

@@ -51,7 +51,7 @@ const LEAST_TRIM: f32 = 0.6;
 const MOST_TRIM: f32 = 1.3;
 
 /// Coefficients of the limit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct VoltageLimit {
     pub(crate) r_s: f32,
     leakage: f32,

@@ -25,7 +25,7 @@ pub type DefaultLoop = crate::flux::FilterLoop;
 
 /// Coefficients of the control step, designed outside the interrupt.
 // The order matters: the fields that every step uses come first and lie together; see the state of the drive.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 pub struct Coefficients<L = DefaultLoop> {
     /// Scales of the sensors and checks of their samples.
@@ -144,7 +144,7 @@ impl<L: AngleLoop> Coefficients<L> {
 }
 
 /// Largest dc current, A, and power, W, motoring and generating.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DcLimit {
     /// Current from the link, A.
     pub current_a: f32,
@@ -158,7 +158,7 @@ impl DcLimit {
 }
 
 /// Limits of dc current and power.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PowerLimit {
     /// See [`blocks`](crate::blocks).
     pub built: Power,
@@ -169,7 +169,7 @@ pub struct PowerLimit {
 }
 
 /// Limits in the units of the control step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Protection {
     /// Largest phase current, A.
     pub trip_a: f32,
@@ -184,7 +184,7 @@ pub struct Protection {
 }
 
 /// The sequence in control periods.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SequenceSteps {
     /// Time with the low sides on, which charges the bootstraps.
     pub precharge: u32,
@@ -202,7 +202,7 @@ pub struct SequenceSteps {
 }
 
 /// Coefficients of the flying start, in control periods and A.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FlyingStart {
     /// See [`blocks`](crate::blocks).
     pub built: Catch,

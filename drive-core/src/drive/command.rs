@@ -10,8 +10,7 @@ use crate::{Coefficients, Dq, Fault};
 /// Exhaustive on purpose, so that code that checks or names the commands has to handle a new one.
 // The large variant is passed by reference and stored only once, in a mailbox.
 #[allow(clippy::large_enum_variant)]
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Command<L = DefaultLoop> {
     /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock if the
     /// angle comes from the injection, then regulate as `Mode` says.
@@ -26,7 +25,7 @@ pub enum Command<L = DefaultLoop> {
     Brake(f32),
     /// From off, or while a motor at rest is tested: apply this test signal. From off the drive first
     /// calibrates the offsets and charges the bootstraps. See `crate::commission`.
-    #[cfg_attr(feature = "serde", serde(skip))]
+    #[serde(skip)]
     Test(TestSignal),
     /// Stop in this way. A drive that neither regulates torque, speed or position nor runs in V/f control stops by
     /// [`Stop::Coast`].
@@ -65,13 +64,12 @@ pub enum Command<L = DefaultLoop> {
     /// is refused as long as it is present.
     MotorTemperature(Result<f32, Fault>),
     /// Replace all settings. Only while off or in fault.
-    #[cfg_attr(feature = "serde", serde(skip))]
+    #[serde(skip)]
     Configure(Coefficients<L>),
 }
 
 /// A way to stop.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stop {
     /// Reduce the torque to zero by `sequence.stop_a_per_s`, then switch off: the shaft coasts. With any setting, the outputs are off

@@ -7,8 +7,7 @@ use crate::Fault;
 /// Quantity that the drive regulates once it runs.
 ///
 /// Exhaustive on purpose, so that code that names or translates the modes has to handle a new one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
     /// Torque, by the q-axis current.
@@ -28,8 +27,7 @@ pub enum Mode {
 /// State of the drive.
 ///
 /// Exhaustive on purpose, so that supervision and field bus have to handle a new state.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
     /// The outputs are off.

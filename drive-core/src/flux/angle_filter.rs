@@ -59,7 +59,7 @@ const REMEMBERED: f32 = 0.7;
 const FIRST: [f32; N - 1] = [0.1, 5.0, 100.0, SLOW];
 
 /// Variances of the filter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AngleFilter {
     /// Variance of the rate of the speed that is added in a second, (rad/s^2)^2.
     pub rate: f32,

@@ -57,7 +57,7 @@ pub enum SearchResult {
 /// Path of the current that the rotating flux drives through rotor, stator and proportional controller,
 /// `Z = k_c e^(-1.5 jwT) + r_s + jw sigma L_s`. This current turns the flux back, so the rotor is faster by the factor
 /// `1 + R_R Re(1/Z)` than the flux.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Path {
     r_r: f32,
     /// Resistance k_c + r_s, ohm.

@@ -58,7 +58,7 @@ pub trait AngleLoop: Copy + Debug + PartialEq {
 }
 
 /// The loop of the synchronous demodulation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FilterLoop {
     /// Saliency offset and saliency sensitivity over i_q.
     pub schedule: GainSchedule,
@@ -91,7 +91,7 @@ impl AngleLoop for FilterLoop {
 }
 
 /// Coefficients of the estimator.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Estimator<L> {
     /// The loop that turns the injection axis.
     pub angle_loop: L,

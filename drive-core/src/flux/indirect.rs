@@ -11,7 +11,7 @@ use crate::math::limited;
 use crate::{Angle, Motor, PERIOD_S};
 
 /// Coefficients of the encoder and the slip.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Indirect {
     /// Electrical angle of one count in units of 2^-32 turn. Its rounding is a relative speed error below
     /// 1e-6 (10 000 counts), equivalent to that much slip.

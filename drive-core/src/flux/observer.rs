@@ -75,7 +75,7 @@ const LEARNED_AT_SHARE: f32 = 0.5;
 const VOLTAGES: usize = 8;
 
 /// Coefficients of the observer, per control period.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Observer {
     /// T r_s, V s/A.
     r_s: f32,

@@ -22,7 +22,7 @@ use crate::table::{POINTS, ReferenceTable, SlopeTable, between, odd};
 const MOST_GAIN: f32 = 2.0;
 
 /// Saliency offset and inverse sensitivity over i_q.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GainSchedule {
     table: ReferenceTable,
     /// Angle error per deviation of the saliency, rad.

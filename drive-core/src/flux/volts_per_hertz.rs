@@ -120,7 +120,7 @@ pub struct VoltsPerHertzSettings {
 }
 
 /// Coefficients of the V/f control. Frequencies are in electrical turns per control period.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct VoltsPerHertz {
     /// See [`blocks`](crate::blocks).
     pub built: Vf,

@@ -12,7 +12,7 @@ use crate::{Line, PERIOD_S};
 const MEAN_SAMPLES: f32 = 16.0;
 
 /// Coefficients of the third current and of the selection of the phases.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Shunts {
     /// Calibration of current c, A.
     pub current_c: Line,

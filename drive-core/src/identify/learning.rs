@@ -73,7 +73,7 @@ const LONE_TAN_LEAD: f32 = 0.2;
 const RAD_PER_S: f32 = TAU / PERIOD_S;
 
 /// Coefficients of the self-commissioning.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Learning {
     /// Longest time of a point, control periods.
     longest: u32,

@@ -19,7 +19,7 @@ use fixed::types::I0F32;
 /// let axis = Angle::QUARTER.unit_vector();
 /// assert!(axis.cos.abs() < 2e-5 && (axis.sin - 1.0).abs() < 2e-5);
 /// ```
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Angle(pub Wrapping<I0F32>);
 
 super::field_by_field!(Angle { 0 });
@@ -106,7 +106,7 @@ impl Angle {
 }
 
 /// `e^(j angle)`: cosine and sine of an angle, computed once and used for every rotation by it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct UnitVector {
     /// Cosine.
     pub cos: f32,

@@ -20,8 +20,7 @@ use crate::math::angle::UnitVector;
 macro_rules! frame {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident),+ }) => {
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq)]
-        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
         #[repr(C)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: f32,)+

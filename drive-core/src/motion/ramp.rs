@@ -15,7 +15,7 @@
 use crate::math::{limited, within};
 
 /// Coefficients of a ramp.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Ramp {
     /// Largest change of the reference in a step.
     most: f32,

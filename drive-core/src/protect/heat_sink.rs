@@ -3,7 +3,7 @@
 use crate::Fault;
 
 /// Checks of the heat sink, in ADC counts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HeatSink {
     /// Smallest and largest ADC counts that do not trip.
     pub window: (u16, u16),

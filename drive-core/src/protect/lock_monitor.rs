@@ -43,7 +43,7 @@ use crate::learned::Learned;
 use crate::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 
 /// Coefficients of the monitor.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LockMonitor {
     /// Q-axis currents of the table of the injection current.
     grid: Grid,

@@ -53,7 +53,7 @@ const MOST: f32 = 4.0;
 const LOOKS: usize = 3;
 
 /// Coefficients of the watch.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NoiseWatch {
     /// Reciprocal of the allowed mean square of `d` without the observer, 1/A^2.
     per_allowed: f32,

@@ -7,7 +7,7 @@ use crate::io::Measured;
 const SAMPLES_AGAIN: u16 = 32;
 
 /// Coefficients of the measurement.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OffsetCheck {
     /// Number of samples averaged.
     pub samples: u16,

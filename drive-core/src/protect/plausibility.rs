@@ -62,7 +62,7 @@ impl CarrierWatch {
 }
 
 /// Coefficients of the comparison between measured and predicted current.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Prediction {
     /// Stator resistance of the settings, ohm.
     r_s: f32,

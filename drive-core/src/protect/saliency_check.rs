@@ -12,7 +12,7 @@ use crate::learned::Learned;
 use crate::{SQRT_3, UnitVector, periods};
 
 /// Coefficients of the check.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SaliencyCheck {
     /// Settling time of current and averages, control periods.
     settle: u32,

@@ -22,7 +22,7 @@ const TRIP: f32 = 1.1;
 const NOTHING_LEFT: f32 = 1.05;
 
 /// Coefficients of a body.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Body {
     /// Steady load per squared current, 1/A^2.
     per_square: f32,
@@ -43,7 +43,7 @@ impl Body {
 }
 
 /// Coefficients of motor and inverter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Thermal {
     /// The motor.
     pub motor: Body,

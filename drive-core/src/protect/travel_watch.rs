@@ -31,7 +31,7 @@ const SILENT_A: f32 = 0.03;
 const MOVES_A: f32 = 0.4;
 
 /// Coefficients of the watch.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TravelWatch {
     /// Largest travel of a silent sensor, A.
     silent_a: f32,

@@ -41,7 +41,7 @@ const ROUNDS: u32 = 2;
 const PULSES_PER_ROUND: u32 = 6;
 
 /// Coefficients of the check.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct WiringCheck {
     /// Peak current with the inductance of the settings, A.
     expected: f32,

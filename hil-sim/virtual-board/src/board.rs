@@ -169,6 +169,11 @@ impl Board {
         unsafe { bytes.as_ptr().cast::<Telemetry>().read_unaligned() }
     }
 
+    /// Reads bytes of the memory, as a debugger does.
+    pub fn read(&self, address: u32, bytes: &mut [u8]) {
+        self.cpu.read(address, bytes);
+    }
+
     /// Returns the chip.
     pub fn chip(&mut self) -> &mut Chip {
         self.cpu.chip_mut()

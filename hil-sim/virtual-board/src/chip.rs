@@ -152,6 +152,8 @@ defaults! {
         pub slow_adc: Adc = Adc::from(2),
         /// Pins of each port that are connected to ground.
         pub grounded: [u32; 7],
+        /// Pins of each port that are connected to the supply.
+        pub lifted: [u32; 7],
         /// Comparators.
         pub comp: [Comparator; 7],
         /// Reference voltages of the comparators.
@@ -193,7 +195,7 @@ impl Chip {
         keep! { self, old:
             now accesses instructions keep_blocks watched forgiving rules flash_cycles
             analog dc_link comparator_offset fault_pull_ohm fault_low damage clock_error reference_error
-            pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers slow_adc.inputs grounded tim1.drop_update tim2.position
+            pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers slow_adc.inputs grounded lifted tim1.drop_update tim2.position
             rcc.flags rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line gates tim5.captures
             flash.bytes flash.torn flash.torn_code flash.operations flash.options
         }

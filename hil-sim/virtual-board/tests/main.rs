@@ -11,6 +11,7 @@ mod commission;
 mod common;
 mod cost;
 mod dc_link;
+mod drive_and_log;
 mod drivers;
 mod first_light;
 mod flips;

@@ -162,8 +162,10 @@ impl Chip {
             },
             EXTI => self.exti.read(offset),
             GPIOA..=GPIOG => {
-                let low = if offset == IDR { self.grounded[port(address)] } else { 0 };
-                Some(self.gpio[port(address)].read(offset)? & !low)
+                let port = port(address);
+                let wires =
+                    if offset == IDR { (self.grounded[port], self.lifted[port]) } else { (0, 0) };
+                Some(self.gpio[port].read(offset)? & !wires.0 | wires.1)
             }
             DAC1 => self.dac[0].read(offset, now),
             DAC3 => self.dac[1].read(offset, now),
