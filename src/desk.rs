@@ -576,6 +576,10 @@ impl Desk {
     /// every start.
     fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) -> Answer {
         self.not_held()?;
+        // A start that turns a stop round: brake and wiring were taken care of.
+        if !drive.is_off() {
+            return give(Command::Start(mode), "", drive);
+        }
         let brake_s = ModuleState::brake_s(self.settings.in_force());
         if brake_s.is_some() || self.braked {
             drive.command(Command::Brake(brake_s.unwrap_or(0.0)))?;

@@ -116,7 +116,7 @@ impl Terminals {
         let settings = desk.settings().in_force();
         let (own, speed) = (settings.modules.terminals, self.speed(settings, port, closed));
         let state = status.map_or(State::Off, |status| status.state);
-        let (off, hold) = (drive.is_off(), own.interlock(closed));
+        let (off, stopping, hold) = (drive.is_off(), drive.is_stopping(), own.interlock(closed));
         let commands = desk.commander() == Commander::Terminals;
         // The arbiter shows a refusal at the console.
         let mut give =
@@ -125,7 +125,6 @@ impl Terminals {
         if commands && own.reset && reset && closed.has(Contacts::RESET) {
             give(desk, Order::Clear);
         }
-        let stopping = state.is_stopping();
         let harder =
             hold == Some(Stop::Now) || (hold == Some(Stop::Coast) && state != State::Stopping);
         if let Some(stop) = hold
@@ -135,7 +134,7 @@ impl Terminals {
             give(desk, Order::Stop(stop));
         }
         let (held, busy) = (hold.is_some(), desk.is_busy());
-        let seen = Seen { commands, held, busy, ended: off || stopping, off };
+        let seen = Seen { commands, held, busy, ended: off || stopping };
         let [contact, start] = [contacts, closed].map(|contacts| contacts.has(Contacts::START));
         match (self.sequence.step(own.start, contact, start, seen), speed) {
             (Act::Stop, _) => give(desk, Order::Stop(Stop::Ramp)),

@@ -2,7 +2,7 @@
 
 use crate::common::config;
 use drive_core::{Command, Mode, State, Stop};
-use hil_sim::rig::Rig;
+use hil_sim::rig::{RATE_HZ, Rig};
 
 /// Turns the shaft at `rpm`, stops in this way, and returns the seconds until the outputs are off and the speed then, rpm.
 fn stopped(changes: &[&str], mode: Mode, rpm: f64, stop: Stop) -> (f64, f64) {
@@ -91,4 +91,68 @@ fn an_s_ramp_rounds_speed_and_stop() {
     let a: Vec<_> = speeds.windows(300).step_by(300).map(|w| (w[299] - w[0]) / 0.05).collect();
     let jerk = a.windows(3).fold(0.0_f64, |m, w| m.max((w[2] - w[0]).abs()));
     assert!(jerk < 100.0, "{jerk}");
+}
+
+/// A start at any moment of a stop turns it round, in each mode: the drive regulates at once, the torque never exceeds that of the stop or
+/// of the usual ramp, and the shaft reaches the new reference without turning back on its way.
+#[test]
+fn a_start_turns_a_stop_round_in_each_mode() {
+    const MOMENTS: usize = 100;
+    let changes = ["load.mode=free", "prepare.learn=yes", "angle.source=injection"];
+    for (mode, stop, seed) in [
+        (Mode::Speed, Stop::Ramp, 1),
+        (Mode::Speed, Stop::Quick, 2),
+        (Mode::Speed, Stop::Coast, 3),
+        (Mode::Torque, Stop::Ramp, 4),
+        (Mode::Position, Stop::Ramp, 5),
+        (Mode::VoltsPerHertz, Stop::Ramp, 6),
+    ] {
+        let mut rig = Rig::from_config(&config(&changes), seed).unwrap();
+        rig.start(mode).unwrap();
+        let reference = match mode {
+            Mode::Torque => Command::Torque(0.5),
+            Mode::Position => Command::Position(10.0),
+            _ => Command::Speed(300.0),
+        };
+        rig.command(&reference).unwrap();
+        let mut rpm = 0.0_f64;
+        while rpm < 200.0 {
+            assert!(rig.time() < 40.0, "{mode:?}: {rpm} rpm");
+            rig.run(0.01, |p| rpm = p.speed_rpm);
+        }
+        rig.command(&Command::Stop(stop)).unwrap();
+        let (mut moments, mut largest) = (Vec::new(), 0.0_f64);
+        while rig.drive.state() != State::Off {
+            moments.push(rig.clone());
+            rig.run(1.0 / RATE_HZ, |p| largest = largest.max(p.torque.abs()));
+        }
+        for n in 0..MOMENTS {
+            let mut rig = moments[n * (moments.len() - 1) / (MOMENTS - 1)].clone();
+            let from = rig.drive.state();
+            rig.command(&Command::Start(mode)).unwrap();
+            assert_eq!(rig.drive.state(), State::of_mode(mode), "{from}");
+            if mode != Mode::Position {
+                rig.command(&reference).unwrap();
+            }
+            let (mut speeds, mut torque) = (Vec::new(), 0.0_f64);
+            rig.run(1.5, |p| {
+                speeds.push(p.speed_rpm);
+                torque = torque.max(p.torque.abs());
+            });
+            let (first, last) = (speeds[0], speeds[speeds.len() - 1]);
+            let least = speeds.iter().copied().fold(first, f64::min);
+            let case = format!(
+                "{mode:?} {stop:?} at {n} from {from}: {first} {least} {last} rpm, {torque} Nm"
+            );
+            assert_eq!(rig.drive.state(), State::of_mode(mode), "{case}");
+            assert!(torque < 1.35 * largest, "{case}, {largest} Nm");
+            let reaches = match mode {
+                Mode::Torque => last > first + 100.0,
+                Mode::Position => last.abs() < 40.0 && least > first.min(0.0) - 12.0,
+                _ => (last - 300.0).abs() < 20.0,
+            };
+            assert!(reaches, "{case}");
+            assert!(mode == Mode::Position || least > first - 40.0, "{case}");
+        }
+    }
 }

@@ -225,6 +225,12 @@ impl Motion {
         count.wrapping_sub(state.origin) as i32 as f32 * self.turns_per_count
     }
 
+    /// Returns the position in which the rotor can come to rest on the braking curve, turns.
+    pub fn stopping_point(&self, state: &MotionState, count: u32) -> f32 {
+        let braking = state.speed * (state.speed.abs() + 2.0 * self.bend) / self.twice_braking;
+        self.turns(state, count) + braking
+    }
+
     /// Returns the q-axis current, A, for the goal at the position `count`; called in every control period. The current changes
     /// once in a step of the loops.
     ///

@@ -38,6 +38,10 @@ pub trait DriveHandle {
     fn status(&self) -> Option<Status>;
     /// Whether the outputs are off and stay off until the next command.
     fn is_off(&self) -> bool;
+    /// Whether the drive is stopping with the outputs on, as of the last control period.
+    fn is_stopping(&self) -> bool {
+        self.status().is_some_and(|status| status.state.is_stopping())
+    }
     /// Computes coefficients from settings. Takes seconds: only while the outputs are off.
     ///
     /// # Errors

@@ -129,9 +129,10 @@ impl Bus {
 
     /// Gives the drive the speed of a run command, and ends the command if the drive has stopped.
     fn follow_run(&mut self, desk: &mut Desk, drive: &mut impl DriveHandle) {
-        let stopping = drive.status().is_some_and(|s| s.state.is_stopping());
         match self.run {
-            Run::Starting | Run::Running if drive.is_off() || stopping => self.run = Run::Ended,
+            Run::Starting | Run::Running if drive.is_off() || drive.is_stopping() => {
+                self.run = Run::Ended;
+            }
             Run::Starting | Run::Running => {
                 self.run = Run::Running;
                 // The answer has been given; a refusal is announced.

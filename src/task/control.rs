@@ -54,6 +54,8 @@ const _: () = assert!(size_of::<Drive<FilterLoop>>() <= 4096);
 pub static PERIODS: AtomicU32 = AtomicU32::new(0);
 /// Whether the drive is off or in fault: the outputs are off, and stay off until the next command.
 pub static IS_OFF: AtomicBool = AtomicBool::new(true);
+/// Whether the drive is stopping with the outputs on.
+pub static IS_STOPPING: AtomicBool = AtomicBool::new(false);
 /// Whether the commissioning observes the drive while it regulates.
 pub static RECORD_FOR_MAIN: AtomicBool = AtomicBool::new(false);
 /// Control periods from one record of the stream to the next; 0: none.
@@ -218,6 +220,7 @@ impl Running {
         }
         IS_OFF.store(is_off, Ordering::Relaxed);
         let state = drive.state();
+        IS_STOPPING.store(state.is_stopping(), Ordering::Relaxed);
         let sampled = Sampled::new(&sample, state, drive.limiting());
         let traced = trace.step(&sampled, drive.telemetry());
 

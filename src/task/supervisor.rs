@@ -316,6 +316,10 @@ impl DriveHandle for Supervisor {
         control::IS_OFF.load(Ordering::Relaxed)
     }
 
+    fn is_stopping(&self) -> bool {
+        control::IS_STOPPING.load(Ordering::Relaxed)
+    }
+
     fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
         extended(&mut self.guard, || settings.build_for(&self.chip.timer))
     }

@@ -15,9 +15,7 @@ pub struct Seen {
     pub held: bool,
     /// Controllers are being designed: an accepted start has not begun.
     pub busy: bool,
-    /// The drive is off, with or without a fault.
-    pub off: bool,
-    /// The drive is off or stopping.
+    /// The drive is off, with or without a fault, or stopping: a start begins, or turns the stop round.
     pub ended: bool,
 }
 
@@ -47,7 +45,7 @@ pub struct Sequence {
 impl Sequence {
     /// Takes another reading: `contact` is the contact at START, `closed` its debounced state.
     pub fn step(&mut self, start: Start, contact: bool, closed: bool, seen: Seen) -> Act {
-        let Seen { commands, held, busy, off, ended } = seen;
+        let Seen { commands, held, busy, ended } = seen;
         let may = commands && !held && start != Start::Off;
         let edge = may && closed && self.open == ARMED;
         self.open = match self.open {
@@ -57,7 +55,7 @@ impl Sequence {
             open => open + 1,
         };
         self.runs &= commands && (busy || !ended);
-        if edge && off && !busy {
+        if edge && ended && !busy {
             self.runs = true;
             return Act::Start;
         }

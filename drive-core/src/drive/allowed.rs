@@ -61,7 +61,12 @@ pub(super) fn allowed<L>(command: &Command<L>, state: State, mode: Mode) -> Resu
         }
         (_, Stage::Starting) => taken.starting,
         (_, Stage::Running) => of_mode,
-        (_, Stage::Stopping) => false,
+        // A start turns a stop round.
+        (_, Stage::Stopping) => match command {
+            Command::Start(Mode::VoltsPerHertz) => state == State::BrakingByFrequency,
+            Command::Start(mode) => REGULATING.contains(mode) && state != State::BrakingByFrequency,
+            _ => false,
+        },
     };
     if is_taken { Ok(()) } else { Err(Refused::State(state)) }
 }

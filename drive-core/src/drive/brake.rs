@@ -23,7 +23,10 @@ impl Common {
 
     /// Returns the goal for a shaft that has come to rest.
     pub(super) fn at_rest(&self) -> Goal {
-        if self.brake > 0 { Goal::Hold { left: self.brake } } else { Goal::Release }
+        match self.brake {
+            0 => Goal::Release { regulated: true },
+            left => Goal::Hold { left },
+        }
     }
 }
 

@@ -183,6 +183,9 @@ impl<L: AngleLoop> Drive<L> {
     }
 
     pub(super) fn start(&mut self, job: Start) -> Result<Accepted, Refused> {
+        if !self.is_off() {
+            return self.turn_round(&job);
+        }
         if let Some(fault) = self.kept.limits.motor_fault {
             return Err(Refused::Stands(fault));
         }
@@ -212,7 +215,7 @@ impl<L: AngleLoop> Drive<L> {
             goal @ Goal::Speed { .. } => *goal = Goal::SPEED,
             Goal::Position { turns, press, .. } => (*turns, *press) = (None, None),
             Goal::Torque | Goal::Learn => {}
-            Goal::Brake { .. } | Goal::Hold { .. } | Goal::Release => {}
+            Goal::Brake { .. } | Goal::Hold { .. } | Goal::Release { .. } => {}
         }
         c.estimator.start(&mut field.estimator);
         field.lock = LockMonitorState::default();

@@ -25,7 +25,9 @@ fn columns() -> Vec<(&'static str, Vec<Command>)> {
     let current = TestSignal::Current { amperes, regulator, carrier, binary: false };
     let settings = motor_settings(AngleSource::Injection).build().unwrap();
     vec![
-        ("start, learn", MODES.map(Start).into()),
+        ("start", [Mode::Torque, Mode::Speed, Mode::Position].map(Start).into()),
+        ("start vf", vec![Start(Mode::VoltsPerHertz)]),
+        ("learn", [Mode::Learning, Mode::Commissioning].map(Start).into()),
         ("check of the wiring, brake", vec![CheckWiring, Brake(0.2)]),
         ("commission", vec![Test(current), Test(pulses())]),
         (
@@ -143,12 +145,9 @@ fn rows() -> Vec<(&'static str, Vec<Bench>)> {
         ("exciting the motor at rest", vec![running(Mode::Commissioning)]),
         (
             "braking to rest, stopping",
-            vec![
-                then(turning(Mode::Speed), Stop::Ramp),
-                then(turning(Mode::VoltsPerHertz), Stop::Ramp),
-                then(torque, Stop::Coast),
-            ],
+            vec![then(turning(Mode::Speed), Stop::Ramp), then(torque, Stop::Coast)],
         ),
+        ("braking to rest by frequency", vec![then(turning(Mode::VoltsPerHertz), Stop::Ramp)]),
     ]
 }
 
