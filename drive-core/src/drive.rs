@@ -285,6 +285,11 @@ impl FluxPhase {
     pub fn ready() -> Self {
         Self::Ready(TravelWatchState::NEW)
     }
+
+    /// Whether the angle of the flux is known.
+    pub fn is_known(&self) -> bool {
+        matches!(self, Self::Ready(_) | Self::Learn(_))
+    }
 }
 
 /// Goal of the current control, with its reference. The reference of the torque is the q-axis current itself.
@@ -315,10 +320,7 @@ enum Goal {
         left: u32,
     },
     /// Reduces the torque to zero and switches off.
-    Release {
-        /// Whether the drive regulated before, so that its angle is known.
-        regulated: bool,
-    },
+    Release,
 }
 
 impl Goal {
@@ -326,16 +328,14 @@ impl Goal {
     pub fn regulates(&self) -> bool {
         match self {
             Self::Torque | Self::Speed { .. } | Self::Position { .. } => true,
-            Self::Learn | Self::Brake { .. } | Self::Hold { .. } | Self::Release { .. } => false,
+            Self::Learn | Self::Brake { .. } | Self::Hold { .. } | Self::Release => false,
         }
     }
 
     /// Returns the mode that has this goal. The mode of a drive that stops is never used.
     pub fn mode(&self) -> Mode {
         match self {
-            Self::Torque | Self::Brake { .. } | Self::Hold { .. } | Self::Release { .. } => {
-                Mode::Torque
-            }
+            Self::Torque | Self::Brake { .. } | Self::Hold { .. } | Self::Release => Mode::Torque,
             Self::Speed { .. } => Mode::Speed,
             Self::Position { .. } => Mode::Position,
             Self::Learn => Mode::Learning,
@@ -358,7 +358,7 @@ impl Goal {
                 turns.is_none_or(f32::is_finite) && press.is_none_or(|(speed, _)| speed.is_finite())
             }
             Self::Torque | Self::Learn => true,
-            Self::Brake { .. } | Self::Hold { .. } | Self::Release { .. } => true,
+            Self::Brake { .. } | Self::Hold { .. } | Self::Release => true,
         }
     }
 }

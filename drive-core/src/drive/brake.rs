@@ -23,10 +23,7 @@ impl Common {
 
     /// Returns the goal for a shaft that has come to rest.
     pub(super) fn at_rest(&self) -> Goal {
-        match self.brake {
-            0 => Goal::Release { regulated: true },
-            left => Goal::Hold { left },
-        }
+        if self.brake > 0 { Goal::Hold { left: self.brake } } else { Goal::Release }
     }
 }
 

@@ -215,7 +215,7 @@ impl<L: AngleLoop> Drive<L> {
             goal @ Goal::Speed { .. } => *goal = Goal::SPEED,
             Goal::Position { turns, press, .. } => (*turns, *press) = (None, None),
             Goal::Torque | Goal::Learn => {}
-            Goal::Brake { .. } | Goal::Hold { .. } | Goal::Release { .. } => {}
+            Goal::Brake { .. } | Goal::Hold { .. } | Goal::Release => {}
         }
         c.estimator.start(&mut field.estimator);
         field.lock = LockMonitorState::default();

@@ -22,7 +22,7 @@ impl<S> Field<S> {
     pub fn state(&self) -> State {
         match (&self.flux, &self.goal) {
             (_, Goal::Brake { .. }) => State::Braking,
-            (_, Goal::Hold { .. } | Goal::Release { .. }) => State::Stopping,
+            (_, Goal::Hold { .. } | Goal::Release) => State::Stopping,
             (FluxPhase::Search(_) | FluxPhase::Build { .. }, _) => State::FlyingStart,
             (FluxPhase::Asymmetry(_) | FluxPhase::Hold, _) => State::Magnetising,
             (FluxPhase::Verify | FluxPhase::Prove, _) => State::Verifying,
@@ -46,7 +46,7 @@ impl<S> Field<S> {
         let turning = || Residual::turning(self.estimator.axis.rotor_freq, self.observer.flux);
         let residual = Some(self.carried.residual.unwrap_or_else(turning));
         // Until the flux is verified the shaft may rotate, and its voltage may have falsified the measurements.
-        if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
+        if !self.flux.is_known() {
             return CarryOver { residual, ..self.carried };
         }
         CarryOver {
@@ -261,7 +261,7 @@ impl<L: AngleLoop> Coefficients<L> {
     /// # Errors
     /// The reason why the outputs are switched off.
     fn advance(&self, s: &mut Field<L::State>, k: &mut Common) -> Result<Dq, End> {
-        if !matches!(s.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
+        if !s.flux.is_known() {
             return self.find_flux(s, k);
         }
         let i_q = match s.goal {
@@ -270,7 +270,7 @@ impl<L: AngleLoop> Coefficients<L> {
                 self.follow(s, k)
             }
             Goal::Learn => self.learn(s, k)?,
-            Goal::Release { .. } => {
+            Goal::Release => {
                 let (i_q, ramp) = (&mut k.references.current.q, self.sequence.stop_ramp);
                 if i_q.abs() > ramp && k.elapsed < COAST {
                     *i_q -= limited(*i_q, ramp);
@@ -323,7 +323,7 @@ impl<L: AngleLoop> Coefficients<L> {
                 *left = left.saturating_sub(1);
                 Target::Rest { quick: true }
             }
-            Goal::Torque | Goal::Learn | Goal::Release { .. } => return k.references.current.q,
+            Goal::Torque | Goal::Learn | Goal::Release => return k.references.current.q,
         };
         let estimated = k.seen.rotor_freq * self.speed_per_freq;
         let i_q = self.motion.step(&mut s.motion, goal, k.rotor_count, estimated, range);
@@ -332,9 +332,7 @@ impl<L: AngleLoop> Coefficients<L> {
             Goal::Brake { .. } if self.motion.is_at_rest(&s.motion) => {
                 (s.goal, k.elapsed) = (k.at_rest(), 0);
             }
-            Goal::Hold { left: 0 } => {
-                (s.goal, k.elapsed) = (Goal::Release { regulated: true }, 0);
-            }
+            Goal::Hold { left: 0 } => (s.goal, k.elapsed) = (Goal::Release, 0),
             _ => {}
         }
         i_q

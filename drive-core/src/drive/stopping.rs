@@ -2,7 +2,7 @@
 
 use crate::io::PERIOD_S;
 
-use super::{Common, Drive, End, Field, FluxPhase, Goal, Phase, Start};
+use super::{Common, Drive, End, Field, FluxPhase, Frame, Goal, Phase, Start};
 use crate::drive::command::{Accepted, Refused, Stop};
 use crate::{AngleLoop, Coefficients};
 
@@ -25,22 +25,28 @@ impl<L: AngleLoop> Drive<L> {
                 }
                 scalar.stop = Some(scalar.stop == Some(true) || stop == Stop::Quick);
             }
+            // The angle of the flux is not known yet.
+            (Phase::Field(Field { flux, .. }), _) if !flux.is_known() => self.end(End::Stopped),
             (Phase::Field(field), _) => self.c.stop_field(field, &mut self.kept, stop),
         }
     }
 
     /// Turns a stop round: the drive goes on from the speed of the shaft, with the reference of a start, which is speed or torque 0, or
-    /// the position in which the shaft comes to rest.
+    /// the position in which the shaft can come to rest. [`allowed`](super::allowed) has seen that it stops, and from this kind of control.
     ///
     /// # Errors
-    /// [`Refused::State`] if the drive does not stop, or stops before it has found the angle, or stops from another kind of control.
+    /// [`Refused::State`] if it stops from a self-commissioning.
     pub(super) fn turn_round(&mut self, start: &Start) -> Result<Accepted, Refused> {
+        let (c, k) = (&self.c, &mut self.kept);
         match (&mut self.phase, start) {
-            (Phase::Scalar(scalar), Start::Scalar { .. }) if scalar.stop.is_some() => {
-                (scalar.stop, scalar.speed) = (None, 0.0);
-            }
-            (Phase::Field(field), Start::Field(goal)) if goal.regulates() && field.may_go_on() => {
-                self.c.go_on(field, &mut self.kept, *goal);
+            (Phase::Scalar(scalar), _) => (scalar.stop, scalar.speed) = (None, 0.0),
+            (Phase::Field(field), Start::Field(goal)) if field.frame != Frame::LockedShaft => {
+                c.take_over(field, k);
+                (field.goal, k.references.current.q) = (*goal, 0.0);
+                if let Goal::Position { turns, .. } = &mut field.goal {
+                    *turns = Some(c.motion.stopping_point(&field.motion, k.rotor_count));
+                }
+                field.enter(k, FluxPhase::ready());
             }
             _ => return Err(Refused::State(self.state())),
         }
@@ -48,34 +54,7 @@ impl<L: AngleLoop> Drive<L> {
     }
 }
 
-impl<S> Field<S> {
-    /// Whether the drive stops, and knows the angle of the flux.
-    fn may_go_on(&self) -> bool {
-        match self.goal {
-            Goal::Brake { .. } | Goal::Hold { .. } => true,
-            Goal::Release { regulated } => regulated,
-            Goal::Torque | Goal::Speed { .. } | Goal::Position { .. } | Goal::Learn => false,
-        }
-    }
-}
-
 impl<L: AngleLoop> Coefficients<L> {
-    /// Regulates again during a stop.
-    fn go_on(&self, s: &mut Field<L::State>, k: &mut Common, goal: Goal) {
-        if let Goal::Release { .. } = s.goal {
-            self.take_over(s, k);
-        }
-        s.goal = goal;
-        match &mut s.goal {
-            Goal::Position { turns, .. } => {
-                *turns = Some(self.motion.stopping_point(&s.motion, k.rotor_count));
-            }
-            Goal::Torque => k.references.current.q = 0.0,
-            _ => {}
-        }
-        s.enter(k, FluxPhase::ready());
-    }
-
     /// Lets the speed loop take over at the present speed and q-axis current.
     fn take_over(&self, s: &mut Field<L::State>, k: &Common) {
         let speed = k.seen.rotor_freq / self.freq_per_speed;
@@ -85,7 +64,7 @@ impl<L: AngleLoop> Coefficients<L> {
 
     fn stop_field(&self, s: &mut Field<L::State>, k: &mut Common, stop: Stop) {
         match (&mut s.goal, stop) {
-            (Goal::Release { .. } | Goal::Hold { .. }, _) | (Goal::Brake { .. }, Stop::Ramp) => {
+            (Goal::Release | Goal::Hold { .. }, _) | (Goal::Brake { .. }, Stop::Ramp) => {
                 return;
             }
             (Goal::Brake { quick }, Stop::Quick) => {
@@ -101,14 +80,10 @@ impl<L: AngleLoop> Coefficients<L> {
         if regulates && (brakes || holds) {
             self.take_over(s, k);
         }
-        // A torque that was commanded during the start has not been applied yet, and is cancelled.
-        if !matches!(s.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
-            k.references.current.q = 0.0;
-        }
         s.goal = match (brakes, holds) {
             (true, _) => Goal::Brake { quick: stop == Stop::Quick },
             (_, true) => Goal::Hold { left: k.brake },
-            _ => Goal::Release { regulated: regulates },
+            _ => Goal::Release,
         };
         s.enter(k, FluxPhase::ready());
     }
