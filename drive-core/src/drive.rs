@@ -58,9 +58,7 @@ use crate::protect::travel_watch::TravelWatchState;
 use crate::supply::RelayState;
 
 use axes::Axes;
-pub use coefficients::{
-    Coefficients, DcLimit, DefaultLoop, FlyingStart, PowerLimit, Protection, SequenceSteps,
-};
+pub use coefficients::{Coefficients, DcLimit, DefaultLoop, PowerLimit, Protection, SequenceSteps};
 pub use command::{Accepted, Command, Refused, Stop};
 use flying_start::Residual;
 use limits::Limits;

@@ -12,7 +12,7 @@ pub(crate) mod tracker;
 pub(crate) mod volts_per_hertz;
 
 pub use angle_filter::AngleFilter;
-pub use catch::Path;
+pub use catch::{FlyingStart, Path};
 pub use estimator::{AngleLoop, Estimator, FilterLoop};
 pub use hand_over::Turning;
 pub use indirect::{Indirect, TAU_R_LIMITS};

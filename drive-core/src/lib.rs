@@ -68,9 +68,8 @@ pub mod table;
 
 pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings, Limiting};
 pub use drive::{
-    Accepted, COAST_S, Coefficients, Command, DefaultLoop, Drive, FlyingStart, Mode, Protection,
-    Refused, Regulator, SequenceSteps, Stage, State, Stop, Telemetry, TestReport, TestSignal,
-    TorqueLimits,
+    Accepted, COAST_S, Coefficients, Command, DefaultLoop, Drive, Mode, Protection, Refused,
+    Regulator, SequenceSteps, Stage, State, Stop, Telemetry, TestReport, TestSignal, TorqueLimits,
 };
 pub use drive::{DcLimit, PowerLimit};
 pub use fault::Fault;

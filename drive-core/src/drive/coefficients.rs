@@ -3,11 +3,11 @@
 #[cfg(test)]
 mod tests;
 
-use crate::blocks::{Catch, Power};
+use crate::blocks::Power;
 use crate::carrier::Injection;
 use crate::carrier::at_start::AtStart;
 use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, VoltageLimit};
-use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
+use crate::flux::{Estimator, FlyingStart, Indirect, Observer, VoltsPerHertz};
 use crate::protect::{
     LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, TravelWatch,
     WiringCheck,
@@ -199,30 +199,4 @@ pub struct SequenceSteps {
     pub pushed_freq: f32,
     /// Ramp of the q-axis current at a stop, A per period.
     pub stop_ramp: f32,
-}
-
-/// Coefficients of the flying start, in control periods and A.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct FlyingStart {
-    /// See [`blocks`](crate::blocks).
-    pub built: Catch,
-    /// D-axis current of the speed search, A.
-    pub current: f32,
-    /// Periods in which the injection alone corrects the angle.
-    pub injection_only: u32,
-    /// Periods in which the flux builds up.
-    pub build_up: u32,
-    /// Periods after which no flux is left in a motor that was switched off.
-    pub flux_decay: u32,
-    /// Model that the search subtracts from the voltage.
-    pub path: Path,
-    /// Largest voltage of the residual flux, V.
-    pub residual_v: f32,
-    /// Decay of that flux per period.
-    pub decay: f32,
-}
-
-impl FlyingStart {
-    /// Share of `current` that is sufficient with a residual flux, since the flux also drives a current.
-    pub const WITH_FLUX: f32 = 0.4;
 }

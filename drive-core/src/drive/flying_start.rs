@@ -4,12 +4,12 @@ use core::f32::consts::TAU;
 
 use super::{Common, Field, FluxPhase, Start};
 use crate::current::pi::ReferenceState;
-use crate::flux::catch::{self, SearchResult};
+use crate::flux::catch::{self, FlyingStart, SearchResult};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::math::within;
 use crate::protect::lock_monitor::LockMonitorState;
-use crate::{AngleLoop, Coefficients, Dq, Fault, FlyingStart, PERIOD_S};
+use crate::{AngleLoop, Coefficients, Dq, Fault, PERIOD_S};
 
 /// Share of the search current that bypasses the reference filter. The faster the current rises, the larger is the flux that rotates with
 /// the rotor.

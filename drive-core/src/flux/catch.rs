@@ -83,6 +83,32 @@ impl Path {
     }
 }
 
+/// Coefficients of the flying start, in control periods and A.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct FlyingStart {
+    /// See [`blocks`](crate::blocks).
+    pub built: Catch,
+    /// D-axis current of the speed search, A.
+    pub current: f32,
+    /// Periods in which the injection alone corrects the angle.
+    pub injection_only: u32,
+    /// Periods in which the flux builds up.
+    pub build_up: u32,
+    /// Periods after which no flux is left in a motor that was switched off.
+    pub flux_decay: u32,
+    /// Model that the search subtracts from the voltage.
+    pub path: Path,
+    /// Largest voltage of the residual flux, V.
+    pub residual_v: f32,
+    /// Decay of that flux per period.
+    pub decay: f32,
+}
+
+impl FlyingStart {
+    /// Share of `current` that is sufficient with a residual flux, since the flux also drives a current.
+    pub const WITH_FLUX: f32 = 0.4;
+}
+
 /// State of the search.
 #[derive(Clone, Copy, Debug)]
 pub struct CatchState {

@@ -2,8 +2,8 @@
 
 use crate::settings::Settings;
 use drive_core::blocks::Catch;
-use drive_core::flux::Path;
-use drive_core::{FlyingStart, PERIOD_S, periods};
+use drive_core::flux::{FlyingStart, Path};
+use drive_core::{PERIOD_S, periods};
 
 /// Current of the speed search, as a share of the current limit.
 const SEARCH_SHARE: f32 = 0.714;
