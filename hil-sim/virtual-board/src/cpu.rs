@@ -387,7 +387,17 @@ fn is_stale(uc: &mut Unicorn<Chip>, address: u32) -> bool {
     }
     // An IT block has at most four instructions, so one that contains the block begins within 18 bytes before it.
     let before = uc.mem_read_as_vec(u64::from(address) - 18, 18).unwrap_or_default();
-    !before.chunks_exact(2).any(|code| code[1] == 0xbf && code[0] & 0xf != 0)
+    let contains = |it: usize| {
+        let instructions = 4 - before[it].trailing_zeros();
+        let mut at = it + 2;
+        (0..instructions).any(|_| {
+            let begin = at;
+            at += if before.get(begin + 1).is_some_and(|&high| high >= 0xe8) { 4 } else { 2 };
+            begin == before.len()
+        })
+    };
+    let is_it = |&at: &usize| before[at + 1] == 0xbf && before[at] & 0xf != 0;
+    !(0..before.len()).step_by(2).filter(is_it).any(contains)
 }
 
 /// As above for code in the flash, which may have to wait for the flash.
