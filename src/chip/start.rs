@@ -68,9 +68,11 @@ global_asm!(
     "ldr r0, ={system}; ldr r1, [r0]; msr msp, r1; ldr r0, [r0, #4]; bx r0",
     // PA2 and PA3 at LPUART1 (AHB2ENR, APB1ENR2, AFRL, PUPDR, MODER; BRR, CR1), with the clock after a reset.
     ".Ldamaged: ldr r0, ={rcc}; movs r1, #1; str r1, [r0, #0x4c]; str r1, [r0, #0x5c]; ldr r1, [r0, #0x5c]",
+    // With the port on already, the flash failed in the text itself, which a loss of power has cut: no text again.
+    "ldr r4, ={serial}; ldr r1, [r4]; cmp r1, #0; bne .Lword",
     "ldr r0, ={gpioa}; ldr r1, =0xcc00; str r1, [r0, #0x20]",
     "ldr r1, [r0, #0xc]; orr r1, #0x40; str r1, [r0, #0xc]; ldr r1, [r0]; bic r1, #0x50; str r1, [r0]",
-    "ldr r4, ={serial}; ldr r1, ={divider}; str r1, [r4, #0xc]; movs r1, #0xd; str r1, [r4]",
+    "ldr r1, ={divider}; str r1, [r4, #0xc]; movs r1, #0xd; str r1, [r4]",
     ".Ltell: ldr r0, =.Lerror; bl .Lsend",
     // r0 points to the next expected character of the phrase, or nowhere. Each word restarts the phrase, because a tag may come before
     // it.
@@ -90,8 +92,8 @@ global_asm!(
     ".Lkeep: ldr r1, ={rcc}; ldr r2, [r1, #0x58]; orr r2, #0x10000000; str r2, [r1, #0x58]; ldr r2, [r1, #0x58]",
     "ldr r1, ={pwr}; ldr r2, [r1]; orr r2, #0x100; str r2, [r1]",
     "ldr r1, ={backup}; str r0, [r1]; ldr r0, [r1]; dsb; bx lr",
-    // Sends the text at r0, up to its last bit.
-    ".Lsend: ldrb r1, [r0], #1; cbz r1, .Lsent",
+    // Sends the text at r0, up to its last bit; a text that is not written completely ends where the flash is erased.
+    ".Lsend: ldrb r1, [r0], #1; subs r2, r1, #1; cmp r2, #0x7f; bhs .Lsent",
     ".Lfull: ldr r2, [r4, #0x1c]; lsls r2, #24; bpl .Lfull; str r1, [r4, #0x28]; b .Lsend",
     ".Lsent: ldr r2, [r4, #0x1c]; lsls r2, #25; bpl .Lsent; bx lr",
     // An error of the flash while the image is summed up is handled as a damaged image; other errors go to the handler.
@@ -100,10 +102,11 @@ global_asm!(
     "ldr r0, ={eccr}; ldr r1, [r0]; str r1, [r0]; ldr r1, =.Ldamaged; str r1, [sp, #24]; bx lr",
     ".Lother: b.w non_maskable",
     ".Lend: .ltorg",
-    ".Lerror: .asciz \"error: the image is damaged: `update gates-off`, with the supply of the gate drivers off\\r\\n\"",
     ".Lnowhere: .byte 0",
     ".Lphrase: .ascii \"update gates-off\"; .byte 1",
     ".Lok: .asciz \"ok: ST's loader is next\\r\\n\"",
+    // Last in the block: after a loss of power within this page, what the text asks for can be heard.
+    ".Lerror: .asciz \"error: the image is damaged: `update gates-off`, with the supply of the gate drivers off\\r\\n\"",
     ".size __pre_init, into_loader - __pre_init; .size into_loader, NonMaskableInt - into_loader",
     ".size NonMaskableInt, .Lend - NonMaskableInt",
     backup = const BACKUP,
