@@ -28,6 +28,8 @@ pub struct Period {
 pub(super) struct RunningInterrupt {
     began: u64,
     sample: Sample,
+    /// Whether the outputs were on.
+    enabled: bool,
     ended: bool,
     had_order: bool,
     accesses: u64,
@@ -83,8 +85,9 @@ impl Board {
         if let Some(at) = self.progress.pended.take() {
             self.latest_start = self.latest_start.max(began - at);
         }
+        let enabled = chip.tim1.outputs_on();
         self.progress.entered =
-            Some(RunningInterrupt { began, sample, ended, had_order, accesses });
+            Some(RunningInterrupt { began, sample, enabled, ended, had_order, accesses });
     }
 
     pub(super) fn end_control(&mut self) {
@@ -109,8 +112,11 @@ impl Board {
         note(&mut self.longest_to_compares, to_compares, accesses_before, &chip.blocks[..compared]);
         if entered.ended {
             let [a, b, c] = chip.tim1.written().map(|value| value as u16);
-            let compare = Compare { a, b, c, enabled: chip.tim1.outputs_on() };
-            let RunningInterrupt { began, sample, .. } = entered;
+            let RunningInterrupt { began, sample, enabled, .. } = entered;
+            // A break in the meantime switches off what the interrupt leaves on, and the next sample shows it.
+            let broke = chip.tim1.broken() && !sample.hardware.contains(Hardware::BREAK);
+            let enabled = chip.tim1.outputs_on() || broke && enabled;
+            let compare = Compare { a, b, c, enabled };
             let period = Period { began, sample, compare, took_order, cycles, to_compares };
             self.progress.periods.push_back(period);
         }
