@@ -62,6 +62,9 @@ impl Stage {
             return None;
         }
 
+        // Read before the rest of the timer, so that `status` shows the start of the interrupt and not what follows.
+        let since_top = self.pwm.since_top();
+
         // The watchdog is fed at the beginning, where the interrupt comes at equal intervals; an interrupt that hangs does not feed it
         // again.
         if watched {
@@ -71,7 +74,6 @@ impl Stage {
         // The timer counts down from the top, where the sampling ended and an update came, and was at the top one period before.
         // Otherwise a period was skipped or came late.
         let timer = self.pwm.take_events();
-        let since_top = self.pwm.since_top();
         let now = time::now();
         let since_last = now.wrapping_sub(core::mem::replace(&mut self.began, now));
         // (The first period has waited for the interrupt to be enabled.)
