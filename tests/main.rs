@@ -15,6 +15,7 @@ mod online_tracking;
 mod power_limit;
 mod protections;
 mod replay;
+mod restart;
 mod saliency_check;
 mod sensorless_position;
 mod sensorless_speed;

@@ -29,7 +29,7 @@ use core::hint::black_box;
 use core::mem::offset_of;
 use core::ops::Range;
 
-use crate::blocks::{Catch, Position, Vf};
+use crate::blocks::{Position, Vf};
 use crate::carrier::Asymmetry;
 use crate::carrier::at_start::AtStartState;
 use crate::carrier::injection::Carrier;
@@ -37,7 +37,7 @@ use crate::current::inverter_drop::InverterDropState;
 use crate::current::pi::{DqPiState, ReferenceState};
 use crate::fault::Fault;
 use crate::filter::dissertation::LpfState;
-use crate::flux::catch::CatchState;
+use crate::flux::catch::{CatchState, Try};
 use crate::flux::estimator::EstimatorState;
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
@@ -264,7 +264,7 @@ enum FluxPhase {
     /// The shaft is at rest. A residual flux decays, then the asymmetry of sensors and stator is measured.
     Asymmetry(AtStartState),
     /// The flux of a rotating rotor builds up from this period on.
-    Build { from: u32, _built: Catch },
+    Build { from: u32, at: Try },
     /// The frame is fixed along phase a until the flux is established; then the saliency is checked.
     #[default]
     Hold,
@@ -387,6 +387,8 @@ struct CarryOver {
     asymmetry: Asymmetry,
     /// Residual flux in the motor; `None` before the first run.
     residual: Option<Residual>,
+    /// Speed of the rotor at the end of that run, electrical turns per period; `None` if it is unknown.
+    rotor_freq: Option<f32>,
 }
 
 impl<L: AngleLoop> Drive<L> {
@@ -572,7 +574,8 @@ impl<L: AngleLoop> Drive<L> {
             }
             Phase::Scalar(scalar) => {
                 let volts = self.kept.seen.voltage.q.abs();
-                CarryOver { residual: Some(Residual::of(volts)), ..scalar.carried }
+                let rotor_freq = Some(self.kept.seen.rotor_freq);
+                CarryOver { residual: Some(Residual::of(volts)), rotor_freq, ..scalar.carried }
             }
             Phase::Field(field) => field.carry_over(),
         }

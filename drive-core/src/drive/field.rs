@@ -43,17 +43,21 @@ impl<S> Field<S> {
     /// Returns the quantities that this run passes on to the next run.
     pub fn carry_over(&self) -> CarryOver {
         // Until the speed is found, only the residual flux of the run before is known.
-        let turning = || Residual::turning(self.estimator.axis.rotor_freq, self.observer.flux);
+        let freq = self.estimator.axis.rotor_freq;
+        let turning = || Residual::turning(freq, self.observer.flux);
         let residual = Some(self.carried.residual.unwrap_or_else(turning));
         // Until the flux is verified the shaft may rotate, and its voltage may have falsified the measurements.
         if !self.flux.is_known() {
-            return CarryOver { residual, ..self.carried };
+            let searches = matches!(self.flux, FluxPhase::Search(_));
+            let rotor_freq = if searches { self.carried.rotor_freq } else { Some(freq) };
+            return CarryOver { residual, rotor_freq, ..self.carried };
         }
         CarryOver {
             resistance: self.observer.resistance,
             inverter_drop: self.inverter_drop.volts,
             asymmetry: self.estimator.changed,
             residual,
+            rotor_freq: Some(freq),
         }
     }
 
@@ -72,6 +76,7 @@ impl<S> Field<S> {
 
 impl<L: AngleLoop> Coefficients<L> {
     /// Begins without current, for this goal.
+    #[cold]
     pub(super) fn begin_field(&self, s: &mut Field<L::State>, goal: Goal, carried: &CarryOver) {
         s.frame = match (self.source, goal) {
             (_, Goal::Learn) => Frame::LockedShaft,

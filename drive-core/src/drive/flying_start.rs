@@ -3,8 +3,9 @@
 use core::f32::consts::TAU;
 
 use super::{Common, Field, FluxPhase, Start};
+use crate::blocks::Catch;
 use crate::current::pi::ReferenceState;
-use crate::flux::catch::{self, FlyingStart, SearchResult};
+use crate::flux::catch::{self, CatchState, FlyingStart, Origin, SearchResult, Try};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::math::within;
@@ -18,9 +19,15 @@ const INITIAL_SHARE: f32 = 0.5;
 const NEGLIGIBLE_EMF_V: f32 = 1.0;
 /// Forcing current per missing magnetising current.
 const FORCING_GAIN: f32 = 10.0;
-/// Highest frequency of a rotor for a flying start, electrical turns per period: 2700 rpm of four poles, with the error of
-/// the search. Above it the voltage of the rotor is smaller than the noise of the sensors.
+/// Highest frequency of a rotor that the fixed frame shows, electrical turns per period: 2700 rpm of four poles, with the error of the
+/// search. Above it the voltage of the rotor is smaller than the noise of the sensors.
 const HIGHEST: f32 = 91.0 * PERIOD_S;
+/// Lowest frequency of a rotor that is found in a rotating frame, electrical turns per period.
+const ROTATES: f32 = 3.0 * PERIOD_S;
+/// Share of [`HIGHEST`] below which the fixed frame is left to find a rotor of unknown speed.
+const LEAST_SHARE: f32 = 0.9;
+/// Number of times that a rotating frame follows the speed found in it.
+const STEPS: u8 = 5;
 
 /// Residual flux of the run before.
 #[derive(Clone, Copy, Debug)]
@@ -103,34 +110,124 @@ impl<L: AngleLoop> Coefficients<L> {
         let Some(n) = k.elapsed.checked_sub(self.sequence.precharge) else {
             return Ok(Dq::ZERO);
         };
+        let (at, turns) = (search.at, search.at.freq != 0.0);
         let drives = s.carried.residual.is_some_and(|flux| flux.volts > NEGLIGIBLE_EMF_V);
-        if n == 0 && !drives {
-            s.reference[0] = ReferenceState::at_rest(INITIAL_SHARE * start.current);
+        if n == 0 {
+            if !drives {
+                let current = if turns { start.search_current } else { start.current };
+                s.reference[0] = ReferenceState::at_rest(INITIAL_SHARE * current);
+            }
+            s.estimator.preset_speed(at.freq);
         }
-        let d = if drives { FlyingStart::WITH_FLUX * start.current } else { start.current };
-        if n > catch::FROM {
+        let d = match (turns, drives) {
+            // In the frame that rotates with it, a residual flux shows its speed without current.
+            (true, true) => 0.0,
+            // A larger one would brake the shaft, or add to the current of a residual flux.
+            (true, false) | (false, true) => start.search_current,
+            (false, false) => start.current,
+        };
+        let wanted = Dq { d, q: 0.0 };
+        if n > catch::FROM && !turns {
             self.current_loop.freeze_integrator(&mut s.current_loop);
         }
-        match search.step(n, s.observer.change) {
-            SearchResult::Searching => {}
-            SearchResult::Standing => {
+        let end = start.search[usize::from(turns)];
+        if turns {
+            search.settle(n, end, s.observer.change, k.seen.current);
+        }
+        let flux = match search.step(n, end, s.observer.change) {
+            SearchResult::Searching => return Ok(wanted),
+            SearchResult::Standing if !turns => {
                 s.carried.residual = None;
                 s.hand_over = HandOver::default();
                 self.continue_at_standstill(s, k, 0);
+                return Ok(wanted);
             }
-            SearchResult::Turning(flux_freq) => {
-                let freq = start.path.rotor(flux_freq);
-                if freq.abs() > HIGHEST {
-                    return Err(Fault::NotCaught);
-                }
+            SearchResult::Standing => 0.0,
+            SearchResult::Turning(freq) => freq,
+        };
+        let slip = search.slip(&start.path);
+        let (rotor, is_found) = match (turns, drives) {
+            (false, _) => {
+                let rotor = start.path.rotor(flux);
+                (rotor, rotor.abs() < HIGHEST)
+            }
+            // The next frame has the speed of the residual flux, and then shows the slip.
+            (true, true) => (at.freq + flux, false),
+            (true, false) => (at.freq - slip, slip.abs() < start.near),
+        };
+        // A frame in the other sense than the rotor shows a slow one. So a slow rotor of unknown speed is left to the fixed frame.
+        let least = if at.from == Origin::Run { ROTATES } else { LEAST_SHARE * HIGHEST };
+        let (ahead, most) = (if at.freq < 0.0 { -rotor } else { rotor }, at.freq.abs());
+        let established = if turns { start.injection_only } else { 0 };
+        if turns {
+            // From here on the frame lies along the flux.
+            s.estimator.axis.angle += search.lead();
+            // A frame that is much faster than the rotor shows its speed only roughly, so the next frame rotates with that speed.
+            if !is_found && (least..2.0 * most).contains(&ahead) && at.steps < STEPS {
                 s.carried.residual = None;
-                s.flux = FluxPhase::Build { from: k.elapsed, _built: start.built };
-                s.estimator.preset_speed(freq);
-                s.indirect = IndirectState::default();
-                s.observer.start(self.observer.as_ref());
+                self.search_in(s, k, Try { freq: rotor, steps: at.steps + 1, ..at });
+                return Ok(wanted);
             }
         }
+        if !is_found || (turns && ahead < least) {
+            return self.search_on(s, k).map(|()| wanted);
+        }
+        let flux = search.flux();
+        s.carried.residual = None;
+        s.flux = FluxPhase::Build { from: k.elapsed.wrapping_sub(established), at };
+        s.estimator.preset_speed(rotor);
+        s.indirect = IndirectState::default();
+        s.observer.start(self.observer.as_ref());
+        if turns {
+            s.observer.flux = flux;
+        }
         Ok(Dq { d, q: 0.0 })
+    }
+
+    /// Begins the search for a rotating shaft.
+    #[cold]
+    pub(super) fn begin_search(&self, s: &mut Field<L::State>, built: Catch) {
+        s.hand_over.switch_carrier_off();
+        let fastest = self.flying_start.map_or(0.0, |start| start.fastest);
+        let (from, freq) = match s.carried.rotor_freq {
+            Some(freq) if freq.abs() > ROTATES => (Origin::Run, freq),
+            None if fastest > 0.0 => (Origin::Forward, fastest),
+            _ => (Origin::Fixed, 0.0),
+        };
+        s.flux = FluxPhase::Search(CatchState::new(Try { _built: built, from, freq, steps: 0 }));
+    }
+
+    /// Continues the search in this frame.
+    #[cold]
+    fn search_in(&self, s: &mut Field<L::State>, k: &mut Common, at: Try) {
+        k.elapsed = self.sequence.precharge;
+        s.estimator.preset_speed(at.freq);
+        s.hand_over = HandOver::default();
+        s.hand_over.switch_carrier_off();
+        s.flux = FluxPhase::Search(CatchState::new(at));
+    }
+
+    /// Begins the search in the next frame.
+    ///
+    /// # Errors
+    /// [`Fault::NotCaught`] if the shaft was found in no frame.
+    #[cold]
+    fn search_on(&self, s: &mut Field<L::State>, k: &mut Common) -> Result<(), Fault> {
+        let last = match &s.flux {
+            FluxPhase::Search(search) => search.at,
+            FluxPhase::Build { at, .. } => *at,
+            _ => return Ok(()),
+        };
+        let fastest = self.flying_start.map_or(0.0, |start| start.fastest);
+        let (from, freq) = match last.from {
+            Origin::Run if fastest > 0.0 => (Origin::Forward, fastest),
+            Origin::Forward => (Origin::Backward, -fastest),
+            Origin::Run | Origin::Backward => (Origin::Fixed, 0.0),
+            Origin::Fixed => return Err(Fault::NotCaught),
+        };
+        self.estimator.start(&mut s.estimator);
+        self.search_in(s, k, Try { from, freq, steps: 0, ..last });
+        Ok(())
     }
 
     /// Returns the current while the flux of a rotating rotor builds up, `n` periods after the beginning. The goal is as much
@@ -149,8 +246,9 @@ impl<L: AngleLoop> Coefficients<L> {
         let missing = most - self.observer.as_ref().map_or(most, |o| o.magnetising(&s.observer));
         let (current, built) = self.flying_start.map_or((most, 0), |s| (s.current, s.build_up));
         let d = within(most + FORCING_GAIN * missing, (0.0, current));
-        if n >= built {
-            Fault::NotCaught.unless(self.prediction.sees_flux(&s.prediction))?;
+        if n >= built && !self.prediction.sees_flux(&s.prediction) {
+            self.search_on(s, k)?;
+        } else if n >= built {
             // At speed the injection current without torque does not predict the current under torque, so the baseline is measured
             // later.
             if s.hand_over.leads {

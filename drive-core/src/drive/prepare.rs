@@ -2,11 +2,8 @@
 
 use super::scalar::Scalar;
 use super::standstill_test::StandstillTest;
-use super::{
-    CarryOver, Common, Drive, Field, FluxPhase, Goal, Phase, References, Start, Telemetry,
-};
+use super::{CarryOver, Common, Drive, Field, Goal, Phase, References, Start, Telemetry};
 use crate::drive::state::State;
-use crate::flux::catch::CatchState;
 use crate::io::LOW_SIDES_ON;
 use crate::protect::offsets::OffsetCheckState;
 use crate::protect::wiring_check::WiringCheckState;
@@ -113,8 +110,7 @@ impl<L: AngleLoop> Drive<L> {
                 };
                 c.begin_field(field, goal, &left);
                 if let Some(built) = built {
-                    field.hand_over.switch_carrier_off();
-                    field.flux = FluxPhase::Search(CatchState::new(built));
+                    c.begin_search(field, built);
                 } else {
                     c.continue_at_standstill(field, k, encoder);
                 }

@@ -144,7 +144,7 @@ impl Mechanics {
             }
             Load::Locked => self.mobility = 0.0,
             Load::Speed { speed } => {
-                check("mechanics.load.speed", speed, -2000.0..=2000.0, "rad/s")?;
+                check("mechanics.load.speed", speed, -4000.0..=4000.0, "rad/s")?;
                 self.mobility = 0.0;
             }
         }

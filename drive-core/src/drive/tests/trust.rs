@@ -3,7 +3,7 @@
 use super::*;
 use crate::carrier::at_start::AtStartState;
 use crate::drive::trust::{Check, Lock, Trust};
-use crate::flux::catch::CatchState;
+use crate::flux::catch::{CatchState, Origin, Try};
 use crate::flux::hand_over::Source;
 
 const BUILT: crate::blocks::Catch = crate::blocks::Catch::IN_BUILD.unwrap();
@@ -44,11 +44,14 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
     (settings.observer.enabled, settings.sequence.catch) = (true, true);
     let c = settings.build().unwrap();
     let alone = c.flying_start.unwrap().injection_only;
+    let fixed = Try { _built: BUILT, from: Origin::Fixed, freq: 0.0, steps: 0 };
+    let rotating = Try { from: Origin::Run, freq: 0.01, ..fixed };
     let phases = [
-        (FluxPhase::Search(CatchState::new(BUILT)), 5),
+        (FluxPhase::Search(CatchState::new(fixed)), 5),
+        (FluxPhase::Search(CatchState::new(rotating)), 5),
         (FluxPhase::Asymmetry(AtStartState::new(false)), 5),
-        (FluxPhase::Build { from: 7, _built: BUILT }, 7 + alone - 1),
-        (FluxPhase::Build { from: 7, _built: BUILT }, 7 + alone),
+        (FluxPhase::Build { from: 7, at: fixed }, 7 + alone - 1),
+        (FluxPhase::Build { from: 7, at: fixed }, 7 + alone),
         (FluxPhase::Hold, 5),
         (FluxPhase::Verify, 5),
         (FluxPhase::ready(), 5),
@@ -59,12 +62,13 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
         for frame in [Frame::Encoder, Frame::LockedShaft, Frame::Tracked] {
             let field = Field { flux: flux.clone(), frame, ..Field::default() };
             let name = match (number, frame) {
-                (0, _) => "looking for a turning shaft",
-                (1, _) => "standing, the asymmetry is measured",
-                (2, _) => "turning, found",
-                (3, _) => "the same, 0.2 s later",
-                (4, Frame::LockedShaft) => "magnetising to learn",
-                (4, Frame::Encoder | Frame::Tracked) => "magnetising",
+                (0, _) => "looking for a turning shaft in a fixed frame",
+                (1, _) => "looking for a turning shaft in a rotating frame",
+                (2, _) => "standing, the asymmetry is measured",
+                (3, _) => "turning, found in a fixed frame",
+                (4, _) => "0.2 s later, or found in a rotating frame",
+                (5, Frame::LockedShaft) => "magnetising to learn",
+                (5, Frame::Encoder | Frame::Tracked) => "magnetising",
                 (_, Frame::LockedShaft) => "learning, and stopping from it",
                 (_, Frame::Encoder | Frame::Tracked) => "verifying, regulating, stopping",
             };
