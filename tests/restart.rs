@@ -92,7 +92,7 @@ fn restarts(motor: &str, plant: &str, draws: impl Iterator<Item = Draw>) -> Opti
         while !rig.drive.is_off() {
             rig.wait(0.001);
         }
-        let inertia = f64::from(config.drive.motor.inertia);
+        let inertia = f64::from(config.drive.inertia());
         rig.set_load(Load::Free { torque: draw.load * before * inertia / draw.coast }).unwrap();
         rig.wait(draw.coast);
         rig.set_load(Load::Free { torque: 0.0 }).unwrap();

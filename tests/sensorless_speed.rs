@@ -72,7 +72,7 @@ fn the_inertia_need_not_be_known_well() {
     for factor in [0.5, 2.0] {
         let config = config(&[FREE]);
         let mut settings = config.drive;
-        settings.motor.inertia *= factor;
+        settings.inertia = Some(settings.inertia() * factor);
         let mut rig = Rig::new(&plant_settings(&config), &settings, 5).unwrap();
         rig.start(Mode::Speed).unwrap();
         rig.command(&Command::Speed(150.0)).unwrap();

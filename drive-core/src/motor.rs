@@ -17,21 +17,12 @@ pub struct Motor {
     pub l_m: f32,
     /// Pole pairs.
     pub pole_pairs: u8,
-    /// Inertia of rotor and load, kg m^2; for the speed loop.
-    pub inertia: f32,
 }
 
 impl Motor {
-    /// The motor of the dissertation, Table 5; the inertia is assumed.
-    pub const DEFAULT: Self = Self {
-        r_s: 5.4,
-        r_r: 1.1,
-        l_ls: 0.0276,
-        l_lr: 0.0276,
-        l_m: 0.1771,
-        pole_pairs: 2,
-        inertia: 0.012,
-    };
+    /// The motor of the dissertation, Table 5.
+    pub const DEFAULT: Self =
+        Self { r_s: 5.4, r_r: 1.1, l_ls: 0.0276, l_lr: 0.0276, l_m: 0.1771, pole_pairs: 2 };
 
     /// Returns the rotor inductance, H.
     pub fn l_r(&self) -> f32 {

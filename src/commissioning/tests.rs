@@ -147,7 +147,7 @@ fn the_inertia_is_found_with_a_free_shaft() {
         );
         let turned = (rig.plant.mechanical_angle() - from) / std::f64::consts::TAU;
         let found = session.found(&settings).unwrap();
-        let error = f64::from(found.motor.inertia) / inertia - 1.0;
+        let error = f64::from(found.inertia.unwrap()) / inertia - 1.0;
         println!(
             "{inertia} kg m2, {friction} Nm: {:+.1} %, {turned:.2} turns; {told:?}",
             100.0 * error

@@ -17,6 +17,9 @@ use crate::desk::news::News;
 /// Asymmetry that no gain mismatch explains, above which a second rotor position is advised.
 const UNEXPLAINED: f32 = 0.002;
 
+/// Remark beside the start of a speed loop that is designed for an inertia by rule.
+const ASSUMED: &str = "; inertia assumed: `commission inertia` measures it";
+
 /// Remark beside a fault of a drive with a brake.
 const HANGS: &str = "; the brake closes now and holds the load alone";
 
@@ -62,8 +65,12 @@ impl Console {
                     "fault {code}: {fault}; likely: {likely}; type 'clear'{brake}"
                 ));
             }
-            News::Running(State::Speed) => out.news(format_args!("running: speed")),
-            News::Running(State::Position) => out.news(format_args!("running: position")),
+            News::Running(state @ (State::Speed | State::Position)) => {
+                let mode = if state == State::Speed { "speed" } else { "position" };
+                let is_assumed = desk.settings().in_force().drive.inertia.is_none();
+                let assumed = if is_assumed { ASSUMED } else { "" };
+                out.news(format_args!("running: {mode}{assumed}"));
+            }
             News::Running(State::VoltsPerHertz) => out.news(format_args!("running: vf")),
             News::Running(_) => out.news(format_args!("running: torque")),
             News::Off(why) => out.news(format_args!("off: {why}")),

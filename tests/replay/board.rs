@@ -42,6 +42,8 @@ fn replay(name: &str) -> (Vec<u64>, usize) {
     let mut settings = FirmwareSettings::of_the_board();
     // The recorded board had not learned.
     settings.drive.injection.synchronous.allow_unlearned = true;
+    // This was the default of its image.
+    settings.drive.inertia = Some(0.012);
     let drive = Drive::new(settings.build().unwrap());
     let mut hashes: Vec<Fnv> = Vec::new();
     play(drive, &settings, &samples, &orders, 1, |n, compare, _, _| {

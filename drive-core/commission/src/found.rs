@@ -75,7 +75,7 @@ impl Levels {
 }
 
 impl Found {
-    /// Returns the motor as a T circuit with equal leakages; inertia and pole pairs are the default ones. `None` until the
+    /// Returns the motor as a T circuit with equal leakages and the default pole pairs. `None` until the
     /// levels and the leakage are found and, if the main flux saturates, the magnetising curve.
     pub fn motor(&self) -> Option<Motor> {
         let (levels, leakage) = (self.levels?, self.leakage?);
@@ -92,11 +92,10 @@ impl Found {
     /// Returns these settings with the results in them.
     pub(super) fn settings(&self, settings: &Settings, pole_pairs: u8) -> Settings {
         let mut new = *settings;
-        let inertia = self.inertia.unwrap_or(settings.motor.inertia);
-        new.motor.inertia = inertia;
+        new.inertia = self.inertia.or(settings.inertia);
         let (Some(levels), Some(leakage)) = (self.levels, self.leakage) else { return new };
         let Some(motor) = self.motor() else { return new };
-        new.motor = Motor { pole_pairs, inertia, ..motor };
+        new.motor = Motor { pole_pairs, ..motor };
         let half = 0.5 * levels.mismatch;
         new.scales.current_a = new.scales.current_a.scaled(1.0 / (1.0 + half));
         new.scales.current_b = new.scales.current_b.scaled(1.0 + half);

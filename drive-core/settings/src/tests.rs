@@ -15,7 +15,7 @@ fn what_a_learning_depends_on_is_compared_and_nothing_else() {
     };
     let same: [fn(&mut Settings); 6] = [
         |_| {},
-        |s| s.motor.inertia = 1.0,
+        |s| s.inertia = Some(1.0),
         |s| s.limits.trip_a = Some(4.0),
         |s| s.angle_source = AngleSource::Encoder,
         |s| s.injection.synchronous.bandwidth_hz = 2.0,

@@ -25,7 +25,6 @@ fn settings(plate: Nameplate, pole_pairs: u8, at: [f32; 4], range: f32) -> Setti
         l_lr: log(0.05, 0.15, at[2]) * l,
         l_m: log(1.0, 4.0, at[3]) * l,
         pole_pairs,
-        ..Motor::DEFAULT
     };
     let mut s = Settings { motor, nameplate: plate, ..Settings::default() };
     s.inverter.dc_link_v = SQRT_2 * plate.voltage_v;

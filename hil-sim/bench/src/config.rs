@@ -119,8 +119,8 @@ impl Config {
     /// acceleration. The result is not a larger share of the torque at the current limit either.
     pub fn newton_metres(&self, on_reference: f64) -> f64 {
         let torque = self.relative(|s| s.motor.torque_per_ampere(s.i_d()) * s.current_limit_a());
-        let inertia = self.relative(|s| s.motor.inertia / f32::from(s.motor.pole_pairs));
-        on_reference * torque.min(inertia)
+        let inertia = |of: &Settings| f64::from(of.inertia() / f32::from(of.motor.pole_pairs));
+        on_reference * torque.min(inertia(&self.drive) / inertia(&Self::default().drive))
     }
 
     /// Rated torque, Nm: power over speed of the nameplate.

@@ -35,7 +35,7 @@ pub fn commissioned(config: &Config, seed: u64) -> Result<Settings, Error> {
         return Err(Error::Refused(format!("commissioning: {}: {why}", step.word())));
     }
     let mut settings = session.commissioning.settings(&unaware(config));
-    settings.motor.inertia = config.drive.motor.inertia;
+    settings.inertia = config.drive.inertia;
     Ok(settings)
 }
 

@@ -170,7 +170,7 @@ fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<
     }
     let settings = session.commissioning.settings(&unaware(config));
     config.drive = settings;
-    config.drive.motor.inertia = config.motor.inertia as f32;
+    config.drive.inertia = Some(config.motor.inertia as f32);
     let i_d = f64::from(settings.i_d());
     let [found, truth] = session.circuits(config, &settings);
     record.errors = found.errors_pct(&truth).to_vec();

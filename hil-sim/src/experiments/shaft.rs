@@ -214,7 +214,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let rated_rpm = rated_rpm(config);
     // Starting time from torque and inertia of the settings: s from rest to the rated speed.
     let mechanical_s =
-        f64::from(config.drive.motor.inertia) * rated_rpm * TAU / 60.0 / config.rated_nm();
+        f64::from(config.drive.inertia()) * rated_rpm * TAU / 60.0 / config.rated_nm();
     let bound_rpm = |(case, [seen, _]): &(&Case, &[Response; 2])| {
         seen.load.abs() * loops.delay_s() / (mechanical_s * case.inertia) * rated_rpm
     };

@@ -313,7 +313,7 @@ const WRITTEN: [(u16, f32); 7] = [
 fn a_master_that_was_set_up_before_needs_no_other_numbers() -> Result<()> {
     let mut config = Config::default();
     // Saved by this program, under their numbers.
-    (config.drive.motor.r_s, config.drive.motor.inertia) = (5.5, 0.011);
+    (config.drive.motor.r_s, config.drive.inertia) = (5.5, Some(0.011));
     config.drive.current_plant.d.k = Some(0.003);
     let options = options(&config);
     let saved = confirmed::settings(&options)?;

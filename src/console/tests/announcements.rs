@@ -147,8 +147,8 @@ fn the_end_of_a_start_and_of_a_stop_is_told() {
     assert!(talk.say("").is_empty());
     for (state, line) in [
         (State::Torque, "* running: torque"),
-        (State::Speed, "* running: speed"),
-        (State::Position, "* running: position"),
+        (State::Speed, "* running: speed; inertia assumed: `commission inertia` measures it"),
+        (State::Position, "* running: position; inertia assumed: `commission inertia` measures it"),
     ] {
         talk.drive.drive = in_state(state).drive;
         assert_eq!(talk.say(""), [line]);

@@ -102,7 +102,7 @@ fn accept_puts_in_force_and_saves_what_was_found_and_nothing_else() {
     let saved = talk.drive.saved.expect("not saved");
     assert_eq!(&saved, talk.front.desk.settings().in_force());
     assert!((saved.drive.motor.r_s / 6.0 - 1.0).abs() < 0.01, "{}", saved.drive.motor.r_s);
-    assert_eq!(saved.drive.motor.inertia, 0.02);
+    assert_eq!(saved.drive.inertia, Some(0.02));
     assert_eq!(saved.drive.nameplate, before.drive.nameplate);
     assert_eq!(saved.drive.limits, before.drive.limits);
     assert!(saved.command.wiring_checked);

@@ -49,9 +49,9 @@ fn console_of(config: &Config, seed: u64) -> (String, FirmwareSettings) {
             }
         }
     }
-    let inertia = settings.drive.motor.inertia;
+    let inertia = settings.drive.inertia;
     settings.drive = session.found(&settings.drive).expect("a motor");
-    settings.drive.motor.inertia = inertia;
+    settings.drive.inertia = inertia;
     config.drive = settings.drive;
     settings.learned = Some(Rig::from_config(&config, seed).unwrap().learn().expect("a result"));
     let mut talk = Talk::with(settings);

@@ -27,6 +27,7 @@ fn records_saved_by_commit_1abee12_are_read() {
         ("injection.tracked_rpm", "700"),
         ("injection.loss_s", "0.08"),
         ("limits.current_a", "3.5"),
+        ("motor.inertia", "0.012"),
         ("limits.trip_a", "4.3"),
         ("limits.dc_over_v", "400"),
         ("limits.dc_under_v", "200"),

@@ -108,7 +108,7 @@ impl Settings {
         };
         let standing_freq = PERIOD_S * (self.nameplate.frequency_hz / STANDING_OF_HZ).max(1.0);
         let torque = m.torque_per_ampere(i_d) * PUSHING_ERROR * i_d;
-        let pushed_freq = self.freq_of_rpm(60.0 / TAU * torque / m.inertia * VERIFY_S);
+        let pushed_freq = self.freq_of_rpm(60.0 / TAU * torque / self.inertia() * VERIFY_S);
         Ok(Coefficients {
             front_end: FrontEnd {
                 current_a: s.of_code(s.current_a),
@@ -246,7 +246,7 @@ impl Settings {
     /// The design rule that cannot be met.
     pub fn motion_loops(&self) -> Result<MotionDesign, TuningError> {
         let m = &self.motor;
-        let acceleration = m.torque_per_ampere(self.i_d()) / m.inertia / TAU;
+        let acceleration = m.torque_per_ampere(self.i_d()) / self.inertia() / TAU;
         let design = |source, divider| {
             tuning::design_motion_loops(
                 f64::from(acceleration),

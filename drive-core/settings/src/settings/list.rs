@@ -36,8 +36,8 @@ settings! {
         "motor.l_m" [motor] l_m: f32, 4: number("H").from_to(1e-6, 1000.0).learned();
         /// pole pairs
         "motor.pole_pairs" [motor] pole_pairs: u8, 5: whole().from_to(1.0, 6.0).learned();
-        /// inertia of rotor and load; for the speed loop
-        "motor.inertia" [motor] inertia: f32, 6: number("kg m2").from_to(1e-7, 1000.0);
+        /// inertia of rotor and load, for the speed loop; auto: 0.15 s of rated torque to rated speed, until `commission inertia`
+        "motor.inertia" [] inertia: Option<f32>, 6: auto("kg m2", Settings::inertia).from_to(1e-7, 1000.0);
     ];
 
     /// The temperature sensor of the motor, from ground to an input of the board, fed from the reference of the ADC.
@@ -197,6 +197,8 @@ settings! {
     Settings "" [] {
         /// The motor.
         motor: Motor = Motor::DEFAULT;
+        /// Inertia of rotor and load, kg m²; `None`: assumed, see [`Settings::inertia`].
+        inertia: Option<f32> = None;
         /// The temperature sensor of the motor.
         motor_sensor: MotorSensor = MotorSensor::DEFAULT;
         /// The nameplate of the motor.

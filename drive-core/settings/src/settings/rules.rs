@@ -29,6 +29,7 @@
 //! | `braking.high_v`, `braking.low_v` | 390 V, 260 V | nominal dc link; between the trip voltages |
 //! | `braking.flux_a` | 1 A | rated current; at most 0.998 of `limits.current_a` |
 //! | `limits.unexplained_v` | 12 V | see [`Settings::unexplained_v`] |
+//! | `motor.inertia` | 0.0051 kg m2 | rated torque over rated speed: see [`Settings::inertia`] |
 //! | `vf.volts_per_hz` | 6.333 V/Hz | rated voltage and frequency |
 //! | `vf.boost_a` | 1.629 A | rated current; at most 0.6 of `limits.current_a` |
 
@@ -37,7 +38,7 @@ pub mod dc_link;
 use core::f32::consts::{FRAC_1_SQRT_2, SQRT_2, TAU};
 
 use super::list::RATED_A;
-use super::numbers::{TRIP_OF_RANGE, WITHIN, either_sign};
+use super::numbers::{TRIP_OF_RANGE, WITHIN, either_sign, or_rule};
 use super::{CurrentSensors, Flux, IdentifiedPlant, Inverter, Nameplate, Settings};
 use crate::tuning::motor_plant;
 use drive_core::printed::DemodulatorKind;
@@ -58,6 +59,9 @@ const LIMIT_OF_RATED: f32 = 1.6;
 /// the leakage saturates, for the noise, and for the overshoot of a step. (0.814 tripped in 27 of 36 self-commissionings
 /// of motors that saturate.)
 const LIMIT_OF_TRIP: f32 = 0.76;
+/// Time in which the rated torque accelerates the assumed inertia to the rated speed, s. Rotors of 0.2 to 20 kW alone take 0.1 to
+/// 0.2 s. With the inertia of a load besides, the speed loop is slower than it could be, but stable.
+const ASSUMED_RUN_UP_S: f32 = 0.15;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
 pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Injection frequency, Hz.
@@ -85,6 +89,15 @@ impl Settings {
     /// It is meant for effects of the inverter voltage error.
     pub fn share_of_dc_link(&self, on_reference: f32) -> f32 {
         on_reference / Inverter::DEFAULT.dc_link_v * self.inverter.dc_link_v
+    }
+
+    /// Returns the inertia of rotor and load, kg m². Until it is measured (`commission inertia`) or set, it is assumed: the rated
+    /// torque takes 0.15 s to the rated speed.
+    pub fn inertia(&self) -> f32 {
+        or_rule(self, self.inertia, |s| {
+            let rated = s.nameplate.speed_rpm * TAU / 60.0;
+            ASSUMED_RUN_UP_S * s.nameplate.torque_nm() / rated
+        })
     }
 
     /// Returns the mechanical speed at the same electrical frequency as `on_reference` with the dissertation's pole pairs.

@@ -96,7 +96,7 @@ impl Motor {
             self.flux += d_flux * h;
             if let Some(load) = self.load {
                 let torque = 1.5 * pairs * (flux.conj() * i).im;
-                self.omega += pairs * (torque - load) / f64::from(m.inertia) * h;
+                self.omega += pairs * (torque - load) / f64::from(self.settings.inertia()) * h;
                 self.theta += self.omega * h;
             }
         }
@@ -115,6 +115,7 @@ impl Motor {
 fn motor_settings(source: AngleSource) -> Settings {
     let mut settings = settings();
     settings.angle_source = source;
+    settings.inertia = Some(0.012);
     settings.scales.current_delay_s = 0.0;
     settings
 }

@@ -89,7 +89,7 @@ fn ours(context: &Context<'_>) -> Result<Trace, Error> {
     let torque = source::value_of("S1", "torque_per_ampere").unwrap_or(f64::NAN);
     config.motor.friction = torque / per_ampere;
     config.motor.inertia = time_constant * config.motor.friction;
-    config.drive.motor.inertia = config.motor.inertia as f32;
+    config.drive.inertia = Some(config.motor.inertia as f32);
     config.drive.angle_source = AngleSource::Encoder;
     config.drive.speed.limit_rpm = Some(printed("section 4.1", "limit of the speed") as f32);
     // 70 % of the acceleration at the largest q-axis current.

@@ -154,5 +154,5 @@ impl Session {
 
 /// Returns the settings of a drive that knows its nameplate, but not its motor.
 pub fn unaware(config: &Config) -> Settings {
-    Settings { motor: Motor::default(), ..config.drive }
+    Settings { motor: Motor::default(), inertia: None, ..config.drive }
 }

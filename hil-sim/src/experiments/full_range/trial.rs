@@ -44,7 +44,7 @@ const SAG_S: f64 = 1.0;
 pub fn set_up(case: Case, config: &mut Config) {
     if case.kind == RangeKind::Braking {
         config.motor.inertia *= HEAVY;
-        config.drive.motor.inertia *= HEAVY as f32;
+        config.drive.inertia = Some(config.drive.inertia() * HEAVY as f32);
         config.drive.speed.ramp_rpm_per_s = Some(config.rpm(HEAVY_RAMP_RPM_PER_S) as f32);
     }
     if matches!(case.kind, RangeKind::Braking | RangeKind::Outage) {

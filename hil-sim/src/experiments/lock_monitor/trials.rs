@@ -151,7 +151,7 @@ fn load_step(
     let mut rig = at_speed(config, OperatingPoint { iq: 0.0, ..case })?;
     let motor = &config.drive.motor;
     let per_ampere = f64::from(motor.torque_per_ampere(config.drive.i_d()));
-    let k_p = f64::from(motor.inertia) * SPEED_LOOP / per_ampere;
+    let k_p = f64::from(config.drive.inertia()) * SPEED_LOOP / per_ampere;
     let (mut integral, mut estimate) = (0.0, case.rpm);
     rig.set_load(Load::Free { torque: 0.0 })?;
     let pace = 1.0 / 600.0;

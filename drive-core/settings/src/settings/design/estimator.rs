@@ -90,7 +90,7 @@ impl Settings {
         let saliency = AVERAGED_NOISE * noise_a / carrier_a;
         let rate = if self.uses_observer() {
             let rated = self.nameplate.power_w / (TAU / 60.0 * self.nameplate.speed_rpm);
-            LOAD_STEP * rated * f32::from(m.pole_pairs) / m.inertia
+            LOAD_STEP * rated * f32::from(m.pole_pairs) / self.inertia()
         } else {
             let angle = saliency / self.slope().at_rest();
             let w = TAU * self.injection.synchronous.bandwidth_hz;
