@@ -466,7 +466,7 @@ settings! {
         limit_rpm: Option<f32> = None, 86: auto("rpm", speed_limit_rpm: |s| (if s.uses_observer() { s.nameplate.speed_rpm } else { s.share_of_poles(300.0) }).min(WITHIN * s.speed_trip_rpm()))
             .beside(|s| (1.0, s.speed_trip_rpm())).guarded(Guard::Lower);
         /// largest acceleration of the speed reference
-        ramp_rpm_per_s: Option<f32> = None, 87: auto("rpm/s", ramp_rpm_per_s: |s| s.share_of_poles(300.0)).from_to(1.0, 1e5).guarded(Guard::Raise);
+        ramp_rpm_per_s: Option<f32> = None, 87: auto("rpm/s", ramp_rpm_per_s: |s| 300.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm).from_to(1.0, 1e5).guarded(Guard::Raise);
         /// deceleration of a quick stop
         quick_rpm_per_s: Option<f32> = None, 88: auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5)).guarded(Guard::Raise);
         /// time for the acceleration to reach its full value, in speed mode and ramp stops; 0: at once

@@ -21,7 +21,8 @@
 //! | `injection.current_saliency` | 0.0338 1/A | inverse of the rated current |
 //! | `injection.tracked_rpm` | 700 rpm | inverse of the pole pairs |
 //! | `speed.limit_rpm` | 1720 rpm with the observer | rated speed; at most 0.998 of `limits.speed_rpm` |
-//! | `speed.limit_rpm` without it, `speed.ramp_rpm_per_s` | 300 rpm, 300 rpm/s | inverse of the pole pairs |
+//! | `speed.limit_rpm` without it | 300 rpm | inverse of the pole pairs |
+//! | `speed.ramp_rpm_per_s` | 300 rpm/s | rated speed, which the ramp reaches after 5.7 s |
 //! | `speed.quick_rpm_per_s` | 900 rpm/s | `speed.ramp_rpm_per_s` |
 //! | `limits.speed_rpm` | 2000 rpm | rated speed |
 //! | `current_plant.d`, `.q` | Eq. 3.41, 3.42 | the plants computed from the parameters |
