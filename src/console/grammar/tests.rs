@@ -1,5 +1,4 @@
 use drive_core::{Mode, Stop, homing};
-use drive_settings::value::ValueError;
 use proptest::prelude::*;
 
 use super::*;
@@ -90,72 +89,6 @@ fn commands_are_understood() {
     for (line, request) in table {
         assert_eq!(parse(line), Ok(request), "{line}");
     }
-}
-
-/// The answer names the thing, the word, and what is allowed or meant.
-#[test]
-fn what_is_half_wrong_is_refused_whole() {
-    let table = [
-        ("", "a command is missing"),
-        ("stopp", "no such command: stopp; did you mean `stop`? `help` lists them"),
-        ("rubbish", "no such command: rubbish; `help` lists them"),
-        ("stop soon", "the way to stop = soon: not one of: ramp quick now"),
-        ("angle", "encoder or injection is missing"),
-        ("angle guess", "angle_source = guess: not one of: encoder injection"),
-        ("start backwards", "the mode = backwards: not one of: torque speed position vf learning"),
-        ("torque", "the current, A is missing"),
-        ("torque 1 2", "too many words, from `2` on"),
-        ("torque 1,5", "not a number: 1,5 (the current, A)"),
-        ("torque 1A", "not a number: 1A (the current, A)"),
-        ("torque nan", "not a number: nan (the current, A)"),
-        ("speed inf", "not a number: inf (the speed, rpm)"),
-        ("home -30 0.5", "the longest way, turns is missing"),
-        ("position 1e99", "not a number: 1e99 (the position, turns)"),
-        ("set", "the setting is missing"),
-        ("set motor.r_s", "the value is missing"),
-        ("set motor.r_s 1 motor.r_r", "the value is missing"),
-        ("set motor.rs 1", "no such setting: motor.rs; did you mean `motor.r_s`? `get` lists them"),
-        ("set motor.r_s 1 wheel 2", "no such setting: wheel; `get` lists them"),
-        ("set motor.r_s 5ohm", "motor.r_s = 5ohm: not a number"),
-        ("set limits.trip_a off", "limits.trip_a = off: neither a number nor `auto`"),
-        ("get wheel", "no such setting: wheel; `get` lists them"),
-        ("describe wheel", "no such setting: wheel; `get` lists them"),
-        ("trace 0", "the number of records = 0: not a whole number from 1 to 1024"),
-        ("trace 1025", "the number of records = 1025: not a whole number from 1 to 1024"),
-        ("trace 5 0", "the divider = 0: not a whole number from 1 to 1000"),
-        ("trace -5", "the number of records = -5: not a whole number from 1 to 1024"),
-        ("trace 5 i_d_a i_d_a i_d_a i_d_a i_d_a i_d_a i_d_a i_d_a i_d_a", "more than 8 signals"),
-        ("trace 5 on", "fault, or a signal is missing"),
-        ("trace 5 on i_q_a", "above or below is missing"),
-        ("trace 5 on i_q_a over 1", "above or below = over: not one of: above below"),
-        ("trace 5 on i_q_a above x", "not a number: x (the level)"),
-        ("trace 5 on fault now", "too many words, from `now` on"),
-        ("faults 59", "the fault = 59: not a whole number from 1 to 58"),
-        ("learned 61 00000000", "the index = 61: not a whole number from 0 to 60"),
-        ("learned 0 12", "not eight hexadecimal digits: 12"),
-        ("learned 0 +1234567", "not eight hexadecimal digits: +1234567"),
-        ("learned 0", "a word is missing"),
-        ("learned check", "the checksum is missing"),
-        ("log loud", "the level = loud: not one of: off error warn info debug"),
-        ("echo loud", "on or off = loud: not one of: on off"),
-        ("reboot later", "too many words, from `later` on"),
-        ("learn twice", "too many words, from `twice` on"),
-    ];
-    for (line, why) in table {
-        assert_eq!(parse(line).unwrap_err().to_string(), why, "{line}");
-    }
-    let signals = parse("trace 5 i_x").unwrap_err().to_string();
-    assert!(
-        signals.starts_with("no such signal: i_x; ") && signals.ends_with(" limit"),
-        "{signals}"
-    );
-    let near = parse("trace 5 sped_rpm").unwrap_err().to_string();
-    assert!(near.contains("did you mean `speed_rpm`?"), "{near}");
-    let many = "set motor.r_s 1".to_owned() + &" motor.r_s 1".repeat(MOST);
-    assert_eq!(parse(&many), Err(ParseError::TooMany(MOST, "settings")));
-    let key = keys::find("motor.r_s").unwrap();
-    let why = ValueError::Number;
-    assert_eq!(parse("set motor.r_s x"), Err(ParseError::Value { key, word: "x", why }));
 }
 
 proptest! {

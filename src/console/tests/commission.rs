@@ -1,6 +1,6 @@
 //! The commissioning at the console: its requests, its lines, and the acceptance of its results.
 
-use drive_commission::{Refusal, Step};
+use drive_commission::Step;
 use drive_settings::Settings;
 use hil_sim::Config;
 use hil_sim::config::{LoadMode, plant_settings};
@@ -38,54 +38,6 @@ fn found_on_a_motor(settings: &Settings) -> Session {
         }
     }
     session
-}
-
-#[test]
-fn the_steps_are_named_and_the_drive_must_be_off_and_confirmed() {
-    let mut talk = Talk::new();
-    for (line, answer) in
-        [("commission", "ok"), ("commission levels leakage", "ok"), ("commission sensors", "ok")]
-    {
-        assert_eq!(talk.ask(line), answer, "{line}");
-        talk.say("stop\n");
-    }
-    let wrong = talk.ask("commission everything");
-    assert!(wrong.contains("everything") && wrong.contains("current-loop"), "{wrong}");
-    assert!(talk.ask("commission levels leakage sensors").starts_with("error: "));
-    talk.ask("start");
-    assert_eq!(talk.ask("commission"), "error: the drive must be off: `stop` first");
-    talk.ask("stop");
-    talk.drive.running = false;
-    assert!(talk.ask("commission").contains("does not run"));
-}
-
-#[test]
-fn every_value_and_verdict_is_told_on_a_line_of_its_own() {
-    let mut talk = Talk::new();
-    assert_eq!(talk.ask("commission nameplate"), "ok");
-    let told = told(&mut talk);
-    assert!(told.len() >= 4, "{told:?}");
-    assert!(told[0].contains("nameplate: test current 3.578 A"), "{told:?}");
-    assert!(told.iter().any(|line| line == "* commissioning: nameplate: sound"), "{told:?}");
-    assert!(told.last().unwrap().contains("ended; `accept`"), "{told:?}");
-
-    // A refusal names the step and the reason, and says that nothing has changed.
-    let mut talk = Talk::new();
-    assert_eq!(talk.ask("commission leakage"), "ok");
-    talk.drive.session.refused(None);
-    let told = self::told(&mut talk);
-    let why = format!("* commissioning: leakage: refused: {}", Refusal::SamplesLost);
-    assert_eq!(told, [why.as_str(), "* commissioning: ended; the settings are as they were"]);
-}
-
-/// Lines that the console prints until the commissioning has ended.
-fn told(talk: &mut Talk) -> Vec<String> {
-    let mut told = Vec::new();
-    for _ in 0..20 {
-        talk.drive.session.poll(&talk.drive.drive.test_report(), |_| ());
-        told.extend(talk.say(""));
-    }
-    told
 }
 
 #[test]

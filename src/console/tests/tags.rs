@@ -31,35 +31,6 @@ fn the_last_line_of_an_answer_and_no_other_repeats_the_tag() {
             assert_eq!(before, before_plain);
         }
     }
-    // The tag applies to one request, and unrequested lines have none.
-    assert_eq!(talk.say("stop\n"), ["ok"]);
-    assert_eq!(talk.say("@1 start speed\n"), ["@1 ok"]);
-    talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
-    let told = talk.say("");
-    assert!(told.len() == 1 && told[0].starts_with("* fault 20: "), "{told:?}");
-}
-
-#[test]
-fn a_request_with_a_malformed_tag_is_not_carried_out() {
-    let mut talk = Talk::new();
-    for line in ["@ start speed", "@123456789 start speed", "@", "@123456789"] {
-        let told = talk.ask(line);
-        assert!(told.starts_with("error: a tag has 1 to 8 characters"), "{line}: {told}");
-    }
-    assert!(talk.drive.commands.is_empty());
-    assert_eq!(talk.ask("@12345678 start speed"), "@12345678 ok");
-    assert_eq!(talk.drive.commands.len(), 1);
-    assert_eq!(talk.ask("@1"), "@1 error: a command is missing");
-    assert!(talk.ask("@1 @2 stop").starts_with("@1 error: no such command: @2"));
-    assert!(talk.ask("* stop").starts_with("error: no such command: *"));
-}
-
-/// A design takes place before the answer, and the field bus is served meanwhile.
-#[test]
-fn an_answer_that_takes_long_has_the_tag_of_its_request() {
-    let mut talk = Talk::new();
-    talk.say("set motor.r_s 5.5\n");
-    assert_eq!(talk.say("@7 start speed\n@8 stop\n"), ["* designing...", "@7 ok", "@8 ok"]);
 }
 
 #[test]

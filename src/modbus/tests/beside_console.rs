@@ -47,7 +47,7 @@ impl Both {
     }
 
     /// Writes a register; returns the exception, or 0.
-    fn write(&mut self, at: u16, word: u16) -> u8 {
+    pub fn write(&mut self, at: u16, word: u16) -> u8 {
         let pdu = [&[6], &at.to_be_bytes()[..], &word.to_be_bytes()].concat();
         let answer = self.ask(&pdu);
         if answer == pdu { 0 } else { answer[1] }
@@ -61,7 +61,7 @@ impl Both {
     }
 
     /// Stages a setting, by its name.
-    fn set(&mut self, name: &str, value: f32) -> u8 {
+    pub fn set(&mut self, name: &str, value: f32) -> u8 {
         let at = (0x4000 + 2 * keys::find(name).unwrap().id()).to_be_bytes();
         let answer = self.ask(&[&[16], &at[..], &[0, 2, 4], &value.to_be_bytes()].concat());
         if answer[0] == 16 { 0 } else { answer[1] }
