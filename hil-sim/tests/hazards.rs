@@ -88,7 +88,7 @@ fn times(classes: &[String], campaign: &[Vec<Value>]) -> String {
     if classes.is_empty() { String::new() } else { worst.map(text).join(" / ") }
 }
 
-/// Collects the names of all functions of the tests and of the modules with tests.
+/// Collects the names of the functions of all tests, and of the files of `tests/sessions`.
 fn functions(folder: &Path, found: &mut BTreeSet<String>) {
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let (path, name) = (entry.path(), entry.file_name());
@@ -98,13 +98,18 @@ fn functions(folder: &Path, found: &mut BTreeSet<String>) {
             let text = fs::read_to_string(&path).unwrap();
             let tests = text.split("#[test]").skip(1).filter_map(|rest| rest.split_once("fn "));
             found.extend(tests.filter_map(|(_, rest)| Some(rest.split_once('(')?.0.to_owned())));
+        } else if folder.ends_with("tests/sessions") {
+            found.insert(name.to_string_lossy().into_owned());
         }
     }
 }
 
 fn proof(classes: &[String], tests: &[String]) -> String {
     let class = classes.iter().map(|class| format!("*{class}*"));
-    let test = tests.iter().map(|test| format!("`{test}`"));
+    let test = tests.iter().map(|test| match test.ends_with(".txt") {
+        true => format!("[`{test}`](../tests/sessions/{test})"),
+        false => format!("`{test}`"),
+    });
     class.chain(test).collect::<Vec<_>>().join("; ")
 }
 

@@ -12,7 +12,7 @@ use super::reference::{Lost, share};
 use super::sequence::ARMED;
 use super::settings::{Enable, Settings, Start};
 use super::*;
-use crate::boards::{ALL, Board, CONTACTS, TERMINALS};
+use crate::boards::{ALL, CONTACTS, TERMINALS};
 use crate::generated;
 
 fn code(full_v: f32, volts_of_ten: f32) -> u16 {
@@ -203,39 +203,15 @@ fn references_in_and_out_of_range() {
     }
 }
 
-/// Functions without their pins, a switch without ENABLE, and a signal without a live zero are refused by name.
+/// Above 60 V a signal without a live zero needs a second input.
 #[test]
-fn what_a_board_cannot_do_is_refused_by_name() {
-    let all = Settings {
-        enable: Enable::Yes,
-        start: Start::Buttons,
-        reverse: true,
-        reset: true,
-        presets: true,
-        reference: Reference::Voltage,
-        outputs: true,
-        brake: true,
-        ..Settings::default()
-    };
-    let [reference, ihm08m1, ihm023v3, _] = ALL;
-    let refused = |own: Settings, board: &Board| {
-        own.check(board).err().map(|why| why.to_string()).unwrap_or_default()
-    };
-    assert_eq!(refused(all, reference), "");
-    assert!(ALL.iter().all(|board| refused(Settings::default(), board).is_empty()));
-    assert!(refused(all, ihm08m1).starts_with("strip.reverse = yes: this board has no pin"));
-    assert!(refused(all, ihm023v3).starts_with("strip.enable = yes: this board has no pin"));
-    let switch = Settings { start: Start::Switch, ..Settings::default() };
-    assert!(refused(switch, reference).starts_with("strip.start = switch: needs strip.enable"));
-    assert_eq!(refused(Settings { enable: Enable::Yes, ..switch }, reference), "");
-    // 48 V with one input; then more volts with one input.
-    let voltage = Settings { reference: Reference::Voltage, ..Settings::default() };
-    assert_eq!(refused(voltage, ihm08m1), "");
-    let mut high = *reference;
-    high.terminals.pins[1] = None;
-    assert!(refused(voltage, &high).starts_with("strip.reference = 0-10v: it has no live zero"));
-    let current = Settings { reference: Reference::Current, ..Settings::default() };
-    assert_eq!(refused(current, &high), "");
+fn a_single_voltage_is_no_reference_at_a_high_dc_link() {
+    let mut board = *ALL[0];
+    board.terminals.pins[1] = None;
+    let check = |reference| Settings { reference, ..Settings::default() }.check(&board);
+    let why = check(Reference::Voltage).unwrap_err().to_string();
+    assert!(why.starts_with("strip.reference = 0-10v: it has no live zero"), "{why}");
+    assert_eq!(check(Reference::Current), Ok(()));
 }
 
 /// The wiring of each board, as `docs/terminal-strip.md` has to contain it.
