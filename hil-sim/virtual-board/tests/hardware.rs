@@ -30,35 +30,6 @@ fn ask(board: &mut Board, line: &str, answer: &str) -> Result<String> {
 const REFUSED: &str =
     "error: the board's polarities, dead time and scales are assumed, or were changed";
 
-/// A dead time below that of the board is refused by its range. A longer one, a scale and a limit that trips end the
-/// confirmation while they are staged.
-#[test]
-fn a_typed_protection_ends_the_confirmation() -> Result<()> {
-    for stage in ALL {
-        let mut board = board(stage)?;
-        let settings = stage.firmware_settings();
-        let own = settings.inverter.dead_time_s;
-        let said = ask(&mut board, "set inverter.dead_time_s 0.0000005", "error: ")?;
-        assert!(said.contains(&format!("0.0000005: allowed is {own} to ")), "{said}");
-        for (name, value) in [
-            ("inverter.dead_time_s", 1.2 * own),
-            ("scales.current_b.gain", 1.1 * settings.scales.current_b.gain),
-            ("scales.dc_link.gain", 1.1 * settings.scales.dc_link.gain),
-            ("limits.trip_a", 0.99 * settings.trip_a()),
-            ("limits.dc_over_v", 0.99 * settings.dc_over_v()),
-            // The trip is at most 2.2 times the rated current.
-            ("nameplate.current_a", 0.5 * settings.nameplate.current_a),
-        ] {
-            ask(&mut board, &format!("set {name} {value}"), "ok: staged; ")?;
-            ask(&mut board, "start torque", REFUSED).with_context(|| name.to_owned())?;
-            assert!(!board.gates().any_on(), "{name}");
-            ask(&mut board, "confirm board", "error: there are staged values")?;
-            ask(&mut board, "revert", "ok")?;
-        }
-    }
-    Ok(())
-}
-
 /// The scale is in force and saved, and the board must be confirmed again with it.
 #[test]
 fn a_changed_scale_is_confirmed_before_a_start() -> Result<()> {

@@ -4,7 +4,6 @@ use crate::common;
 use anyhow::{Context, Result, ensure};
 use drive_core::State;
 use drive_stream::{Frame, Piece, Splitter};
-use hil_sim::Config;
 use virtual_board::Pair;
 
 /// Number of control periods per second.
@@ -148,15 +147,6 @@ fn a_lost_link_stops_the_drive_and_brings_the_rate_back() -> Result<()> {
     ear.hear(&mut pair);
     ensure!(ear.frames.len() == frames, "the stream goes on");
     ensure!(!pair.board.chip().tim1.outputs_on());
-    Ok(())
-}
-
-/// A line that is too slow for a stream is reported; nothing is sent.
-#[test]
-fn a_stream_that_the_line_cannot_carry_is_refused() -> Result<()> {
-    let mut pair = common::pair(&Config::default(), 3)?;
-    let answer = pair.say(&format!("stream {EIGHT} 2000"))?;
-    ensure!(answer.starts_with("error: the stream needs 86000 bytes/s"), "{answer}");
     Ok(())
 }
 
