@@ -4,7 +4,7 @@ use drive_commission::{Collector, Commissioning, Next, Record, Refusal, Report, 
 use drive_core::{Command, Mode, Refused, Stop, TestReport};
 use drive_settings::Settings;
 
-use crate::link::ring::Record as Period;
+use crate::recording::ring::Record as Period;
 
 /// Event of a commissioning.
 // Exists once at a time.

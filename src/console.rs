@@ -25,7 +25,7 @@ use core::fmt;
 
 use crate::commissioning::News;
 use crate::desk::Desk;
-use crate::link::trace::Plan;
+use crate::recording::trace::Plan;
 use crate::settings::Commander;
 use crate::settings::staging::Applied;
 use grammar::ParseError;

@@ -18,6 +18,7 @@ pub mod front;
 mod hash;
 pub mod link;
 pub mod monitor;
+pub mod recording;
 pub mod rotor_tracking;
 pub mod settings;
 pub mod store;

@@ -1,8 +1,6 @@
 //! Communication between the main loop and the control interrupt.
 
 pub mod mailbox;
-pub mod ring;
-pub mod trace;
 
 use drive_core::{
     Accepted, Hardware, Limiting, Refused, Sample, State, Telemetry, TestReport, TorqueLimits,
@@ -21,7 +19,7 @@ pub struct Status {
     pub state: State,
     /// Last input of the drive.
     pub sample: Sample,
-    /// Signals of the drive, from the [`ring`].
+    /// Signals of the drive, from the [`ring`](crate::recording::ring).
     pub telemetry: Telemetry,
     /// Core cycles of the longest control period so far.
     pub worst_cycles: [u32; 2],

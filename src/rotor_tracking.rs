@@ -10,7 +10,7 @@ use drive_settings::Settings;
 use rotor_id::online::{NoEstimate, Online, RotorEstimate, SpeedInput};
 
 use crate::board;
-use crate::link::ring::Record;
+use crate::recording::ring::Record;
 
 /// Control periods from one fit of the machine to the next: ten fits per second.
 const PERIODS_PER_FIT: u32 = board::PWM_HZ / 10;
@@ -109,7 +109,7 @@ mod tests {
     use hil_sim::rig::Rig;
 
     use super::*;
-    use crate::link::ring::Ring;
+    use crate::recording::ring::Ring;
 
     /// A drive at 2 A on a locked shaft whose rotor has 30 % more resistance than in the settings, and its tracking.
     fn tracked() -> (Rig, Tracking) {

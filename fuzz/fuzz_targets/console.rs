@@ -9,7 +9,7 @@ use drive_core::{Measured, State};
 use induction_drive::console::grammar::{COMMANDS, LEVELS};
 use induction_drive::console::line::UNASKED;
 use induction_drive::front::Front;
-use induction_drive::link::trace::SIGNALS;
+use induction_drive::recording::trace::SIGNALS;
 use induction_drive::settings::keys;
 use induction_drive_fuzz::START;
 use induction_drive_fuzz::doubles::{FakeBus, FakeDrive, FakePort, FakeTerminals, found};

@@ -10,7 +10,7 @@ use super::number::Significant;
 use super::{Console, reply};
 use crate::desk::order::Reply;
 use crate::desk::{Answer, Desk, may_stage};
-use crate::link::trace::{Plan, SIGNALS, Trigger};
+use crate::recording::trace::{Plan, SIGNALS, Trigger};
 use crate::settings::Commander;
 use crate::settings::staging::UNCONFIRMED;
 

@@ -24,7 +24,6 @@ use crate::settings::staging::{Assignments, MOST};
 pub use commands::NUMBERS;
 pub use commands::{COMMANDS, HELP, HELP_END};
 pub use error::{ParseError, TagError};
-pub use recording::Stream;
 pub use request::{LEVELS, Level, ListKind, Request, WORDS_IN_LINE};
 
 /// Most records of a trace.

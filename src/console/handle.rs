@@ -4,8 +4,8 @@ use core::fmt::{self, Write};
 
 use super::grammar::Level;
 use crate::desk::handle::DriveHandle;
-use crate::link::ring::Record;
-use crate::link::trace::{self, Plan};
+use crate::recording::ring::Record;
+use crate::recording::trace::{self, Plan};
 use crate::rotor_tracking::Report;
 use crate::store::history::History;
 

@@ -14,7 +14,8 @@ use super::number::Significant;
 use super::reply::{self, Description, Setting};
 use super::restore;
 use crate::desk::Desk;
-use crate::link::trace::Plan;
+use crate::recording::stream;
+use crate::recording::trace::Plan;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::{self, Key};
 
@@ -65,7 +66,7 @@ impl Console {
                 .learned()
                 .and_then(|(in_use, result)| reply::learned(result, in_use, next))
                 .map(|text| say(&text, next + 1)),
-            ListKind::Signals => super::stream::described(line).map(|text| say(&text, next + 1)),
+            ListKind::Signals => stream::described(line).map(|text| say(&text, next + 1)),
             ListKind::Trace if drive.tracing() => return,
             ListKind::Trace => self.trace_line(next, &settings.drive, drive),
         };

@@ -15,7 +15,7 @@ use super::grammar::HELP;
 use super::*;
 use crate::boards;
 use crate::front::Front;
-use crate::link::trace::Trigger;
+use crate::recording::trace::Trigger;
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys;

@@ -14,7 +14,7 @@ use crate::desk::Desk;
 use crate::desk::order::Refusal;
 use crate::desk::power::Power;
 use crate::link::Status;
-use crate::link::trace::{SIGNALS as ALL_SIGNALS, Sampled, shown};
+use crate::recording::trace::{SIGNALS as ALL_SIGNALS, Sampled, shown};
 use crate::settings::Commander;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys;

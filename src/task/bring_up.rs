@@ -25,12 +25,12 @@ use induction_drive::chip::{adc, clocks, dc_link, encoder, memory, over_voltage,
 use induction_drive::commissioning::Session;
 use induction_drive::front::Front;
 use induction_drive::link::mailbox::Mailbox;
-use induction_drive::link::ring::Ring;
-use induction_drive::link::trace::Trace;
 use induction_drive::link::{Answer, Status};
 use induction_drive::modbus;
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict, WINDOW_CYCLES};
+use induction_drive::recording::ring::Ring;
+use induction_drive::recording::trace::Trace;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
 use induction_drive::store::history::History;

@@ -21,10 +21,10 @@ use stm32g4xx_hal::stm32::interrupt;
 use induction_drive::board;
 use induction_drive::chip::stage::Stage;
 use induction_drive::link::mailbox::{Receiver, Sender};
-use induction_drive::link::ring::Writer;
-use induction_drive::link::trace::{Recorder, Sampled};
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::MemoryRange;
+use induction_drive::recording::ring::Writer;
+use induction_drive::recording::trace::{Recorder, Sampled};
 
 /// The drive and its surroundings, owned by the interrupt.
 #[repr(C)] // keeps the references to the memory shared with the main loop together

@@ -13,7 +13,7 @@ use induction_drive::board::Timer;
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::{
-    commissioning::Session, desk::Desk, link::Status, link::ring::Record, rotor_tracking::Tracking,
+    commissioning::Session, desk::Desk, link::Status, recording::ring::Record, rotor_tracking::Tracking,
     settings::Commander, settings::FirmwareSettings, settings::keys::Key, store::FlashError,
 };
 

@@ -6,7 +6,7 @@ use drive_settings::value::ValueError;
 use thiserror::Error;
 
 use crate::console::line::LONGEST_TAG;
-use crate::link::trace::SIGNALS;
+use crate::recording::trace::SIGNALS;
 use crate::settings::keys::Key;
 
 /// The tag of a request is too long or empty.

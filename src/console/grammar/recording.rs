@@ -4,7 +4,8 @@ use drive_settings::value;
 
 use super::{LARGEST_DIVIDER, LONGEST_TRACE, ParseError, Words, nearest, whole};
 use crate::board::PWM_HZ;
-use crate::link::trace::{self, Plan, SIGNALS, SignalChoice, Trigger};
+use crate::recording::stream::Stream;
+use crate::recording::trace::{self, Plan, SIGNALS, SignalChoice, Trigger};
 
 /// The trace with this number of records.
 pub(super) fn plan<'a>(records: &'a str, words: &mut Words<'a>) -> Result<Plan, ParseError<'a>> {
@@ -32,17 +33,6 @@ pub(super) fn plan<'a>(records: &'a str, words: &mut Words<'a>) -> Result<Plan, 
         plan.choice = SignalChoice::usual();
     }
     Ok(plan)
-}
-
-/// A requested stream.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Stream {
-    /// Its signals.
-    pub choice: SignalChoice,
-    /// Control periods from one frame to the next.
-    pub divider: u16,
-    /// Time without a line after which the drive stops, s; 0: never.
-    pub alive_s: f32,
 }
 
 /// Frames per second of a stream for which no rate is given.

@@ -3,9 +3,9 @@
 use drive_core::Fault;
 use heapless::Vec;
 
-use super::recording::Stream;
 use crate::desk::order::Order;
-use crate::link::trace::Plan;
+use crate::recording::stream::Stream;
+use crate::recording::trace::Plan;
 use crate::settings::keys::Key;
 use crate::settings::staging::Assignments;
 

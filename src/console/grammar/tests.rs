@@ -3,8 +3,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::desk::order::Order;
-use crate::link::trace::Plan;
-use crate::link::trace::{self, SignalChoice, Trigger};
+use crate::recording::trace::Plan;
+use crate::recording::trace::{self, SignalChoice, Trigger};
 
 #[test]
 fn every_command_has_help_but_two_short_ones() {

@@ -8,7 +8,7 @@ use hil_sim::rig::Rig;
 
 use super::*;
 use crate::commissioning::{News, Session};
-use crate::link::ring::Record;
+use crate::recording::ring::Record;
 
 /// A session on a simulated motor of 6 ohm that a drive with these settings has identified.
 fn found_on_a_motor(settings: &Settings) -> Session {

@@ -14,11 +14,11 @@ use super::*;
 use crate::console::grammar::{COMMANDS, NUMBERS};
 use crate::desk::handle::DriveHandle as _;
 use crate::generated;
-use crate::link::trace::{self, SIGNALS, Sampled};
 use crate::modbus::float::to_float;
 use crate::modbus::registers::{self, ROWS};
 use crate::modbus::tests::beside_console::Both;
 use crate::monitor::record::Reason;
+use crate::recording::trace::{self, SIGNALS, Sampled};
 use crate::settings::keys::Key;
 use crate::store::codec::Rejected;
 

@@ -13,7 +13,7 @@ use hil_sim::rig::Rig;
 use super::*;
 use crate::commissioning::{News, Session};
 use crate::desk::news;
-use crate::link::ring::Record;
+use crate::recording::ring::Record;
 
 /// The drive of a configuration commissions its motor, accepts the result, and learns; returns the console's text and the settings.
 fn console_of(config: &Config, seed: u64) -> (String, FirmwareSettings) {

@@ -1,8 +1,8 @@
 //! The frames of the stream beside the lines.
 
 use super::*;
-use crate::link::ring::Record;
-use crate::link::trace::Sampled;
+use crate::recording::ring::Record;
+use crate::recording::trace::Sampled;
 use drive_core::{Stage, Telemetry};
 
 impl Talk {
