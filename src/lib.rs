@@ -16,6 +16,7 @@ pub mod console;
 pub mod desk;
 pub mod front;
 mod hash;
+pub mod history;
 pub mod link;
 pub mod monitor;
 pub mod recording;

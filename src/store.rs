@@ -10,11 +10,10 @@
 
 pub mod codec;
 mod flash;
-pub mod history;
 pub mod learned;
 
 use codec::{COMMIT, Rejected};
-use flash::{ERASED, newer};
+pub(crate) use flash::{ERASED, halves, newer, pair};
 pub use flash::{Flash, FlashError, SLOT_WORDS, SLOTS};
 
 use crate::settings::FirmwareSettings;
@@ -87,4 +86,4 @@ impl<F: Flash> Saved<F> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -4,7 +4,5 @@ pub mod bring_up;
 pub mod check;
 pub mod clock;
 pub mod control;
-pub mod guard;
-pub mod hours;
 pub mod sources;
 pub mod supervisor;

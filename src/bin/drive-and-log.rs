@@ -31,8 +31,7 @@ mod image {
     use induction_drive::chip::{pins, pwm, sleep, stage::Stage, stop, time, window::Window};
     use induction_drive::coefficients::{ADDRESS, Designed, LONGEST};
     use induction_drive::link::mailbox::{Mailbox, Receiver, Sender};
-    use induction_drive::monitor::record::Reason;
-    use induction_drive::monitor::watchdog::{FeedRule, Verdict, WINDOW_CYCLES};
+    use induction_drive::monitor::watchdog::WINDOW_CYCLES;
     use stm32g4xx_hal::gpio::GpioExt;
     use stm32g4xx_hal::pac::{self, Interrupt};
     use stm32g4xx_hal::stm32::interrupt;
@@ -246,13 +245,12 @@ mod image {
         WATCHED.store(true, Relaxed);
         asm::delay(1000 * board::CYCLES_PER_US);
         Window::close();
-        let watchdog = Watchdog::start(chip.IWDG, chip.DBGMCU);
+        let watchdog = Watchdog::start(chip.IWDG, chip.DBGMCU, &PERIODS);
         Ok((reports, watchdog, designed.pole_pairs.into()))
     }
 
     /// The main loop: log, button, watchdog.
     fn run((mut reports, mut watchdog, pole_pairs): Board) -> ! {
-        let mut rule = FeedRule::new(time::now(), PERIODS.load(Relaxed));
         let (mut state, mut logged, mut pressed) = (State::Off, 0, false);
         loop {
             let periods = PERIODS.load(Relaxed);
@@ -284,15 +282,7 @@ mod image {
                     RUN.store(state.is_off() && over_voltage::prove(report.dc_link), Relaxed);
                 }
             }
-            watchdog.run_in_halts();
-            match rule.judge(time::now(), periods, MISSED.load(Relaxed)) {
-                Verdict::Wait => {}
-                Verdict::Feed => watchdog.feed(),
-                Verdict::Refuse { periods, cycles } => {
-                    pwm::outputs_off();
-                    stop::keep(Reason::NotFed, [periods, cycles, 0, 0]);
-                }
-            }
+            watchdog.feed(MISSED.load(Relaxed));
             sleep::until_interrupt();
         }
     }

@@ -1,25 +1,48 @@
 //! The independent watchdog: resets the chip when it is not fed in time. Once started, only a reset stops it.
 
+use core::sync::atomic::{AtomicU32, Ordering};
+
 use cortex_m::asm;
 use stm32g4xx_hal::pac::{DBGMCU, IWDG};
 
+use super::{pwm, stop, time};
 use crate::board;
+use crate::monitor::record::Reason;
+use crate::monitor::watchdog::{FeedRule, Verdict};
 
 /// Keys of IWDG_KR: start the watchdog, unlock its registers, reload it.
 const START: u16 = 0xcccc;
 const UNLOCK: u16 = 0x5555;
 const RELOAD: u16 = 0xaaaa;
 
-/// The watchdog.
+/// The watchdog, and the rule by which it is fed.
 pub struct Watchdog {
     timer: IWDG,
     debug: DBGMCU,
+    /// Control periods since the start, wrapping.
+    periods: &'static AtomicU32,
+    rule: FeedRule,
+}
+
+/// The watchdog, if it runs.
+pub type Guard = Option<Watchdog>;
+
+/// Does long `work` with the time of the watchdog extended to ten seconds, and restarts the rule after it: for work with the outputs off
+/// that ends before they can be switched on. If the flash has one bank, the core and the control with it wait while the flash is written.
+pub fn extended<R>(guard: &mut Guard, work: impl FnOnce() -> R) -> R {
+    let Some(watchdog) = guard else { return work() };
+    watchdog.set(board::WATCHDOG_LONG_PRESCALER, board::WATCHDOG_LONG_RELOAD);
+    let result = work();
+    watchdog.set(board::WATCHDOG_PRESCALER, board::WATCHDOG_RELOAD);
+    watchdog.rule.restart(time::now(), watchdog.periods.load(Ordering::Relaxed));
+    result
 }
 
 impl Watchdog {
-    /// Starts it, with [`board::WATCHDOG_US`].
-    pub fn start(timer: IWDG, debug: DBGMCU) -> Self {
-        let mut watchdog = Self { timer, debug };
+    /// Starts it, with [`board::WATCHDOG_US`], over a control interrupt that counts these periods.
+    pub fn start(timer: IWDG, debug: DBGMCU, periods: &'static AtomicU32) -> Self {
+        let rule = FeedRule::new(time::now(), periods.load(Ordering::Relaxed));
+        let mut watchdog = Self { timer, debug, periods, rule };
         watchdog.run_in_halts();
         watchdog.key(START);
         watchdog.set(board::WATCHDOG_PRESCALER, board::WATCHDOG_RELOAD);
@@ -27,26 +50,27 @@ impl Watchdog {
     }
 
     /// Lets the watchdogs and the time base run on while a debugger halts the core: a halt ends in a reset, so the power stage stays off
-    /// after it. Called in each pass of the main loop, because OpenOCD and ST's server stop the watchdogs when they attach
+    /// after it. Repeated in each pass of the main loop, because OpenOCD and ST's server stop the watchdogs when they attach
     /// (`stm32g4x.cfg`: DBGMCU_APB1_FZR1), and the bits survive a reset.
-    pub fn run_in_halts(&mut self) {
+    fn run_in_halts(&mut self) {
         self.debug.apb1l_fz().modify(|_, w| {
             w.dbg_iwdg_stop().clear_bit().dbg_wwdg_stop().clear_bit().dbg_tim5_stop().clear_bit()
         });
     }
 
-    /// Feeds it.
-    pub fn feed(&mut self) {
-        self.key(RELOAD);
-    }
-
-    /// Does long `work` with the watchdog's time extended to ten seconds: for work with the outputs off that ends before they can be
-    /// switched on.
-    pub fn extended<R>(&mut self, work: impl FnOnce() -> R) -> R {
-        self.set(board::WATCHDOG_LONG_PRESCALER, board::WATCHDOG_LONG_RELOAD);
-        let result = work();
-        self.set(board::WATCHDOG_PRESCALER, board::WATCHDOG_RELOAD);
-        result
+    /// Feeds it if the rule allows it; `missed` is whether a deadline was ever missed. Called in each pass of the main loop.
+    pub fn feed(&mut self, missed: bool) {
+        self.run_in_halts();
+        let periods = self.periods.load(Ordering::Relaxed);
+        match self.rule.judge(time::now(), periods, missed) {
+            Verdict::Wait => {}
+            Verdict::Feed => self.key(RELOAD),
+            // The watchdog is about to reset the chip. The main loop itself works, and the console answers until then.
+            Verdict::Refuse { periods, cycles } => {
+                pwm::outputs_off();
+                stop::keep(Reason::NotFed, [periods, cycles, u32::from(missed), 0]);
+            }
+        }
     }
 
     fn key(&mut self, key: u16) {

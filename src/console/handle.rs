@@ -4,10 +4,10 @@ use core::fmt::{self, Write};
 
 use super::grammar::Level;
 use crate::desk::handle::DriveHandle;
+use crate::history::History;
 use crate::recording::ring::Record;
 use crate::recording::trace::{self, Plan};
 use crate::rotor_tracking::Report;
-use crate::store::history::History;
 
 /// Access of the console to the rest of the firmware.
 pub trait Firmware: DriveHandle {

@@ -14,6 +14,7 @@ use super::number::Significant;
 use super::reply::{self, Description, Setting};
 use super::restore;
 use crate::desk::Desk;
+use crate::history;
 use crate::recording::stream;
 use crate::recording::trace::Plan;
 use crate::settings::FirmwareSettings;
@@ -60,7 +61,7 @@ impl Console {
             ListKind::Board => reply::board(settings, line).map(|text| say(&text, next + 1)),
             ListKind::Fault(fault) => reply::fault(fault, line).map(|text| say(&text, next + 1)),
             ListKind::History => {
-                reply::history(drive.history(), line).map(|text| say(&text, next + 1))
+                history::line(drive.history(), line).map(|text| say(&text, next + 1))
             }
             ListKind::Learned => desk
                 .learned()

@@ -8,9 +8,8 @@ use drive_settings::entry::Change;
 use drive_settings::value::Value;
 
 use crate::settings::FirmwareSettings;
-use crate::settings::keys::{self, Key};
+use crate::settings::keys::Key;
 use crate::settings::staging::Staging;
-use crate::store::history::{CHANGED, History};
 
 /// A setting with its unit and the allowed values. They are computed before anything is printed, because both the printing and the range
 /// need much stack.
@@ -149,32 +148,6 @@ pub fn fault(fault: Fault, i: usize) -> Option<impl fmt::Display> {
     (i <= causes.len()).then_some(fmt::from_fn(move |f| match causes.get(i) {
         Some(cause) => write!(f, "cause {}: {cause}", i + 1),
         None => write!(f, "cure: {}", fault.cure()),
-    }))
-}
-
-/// Line number `i` of the history: the totals, then the faults, the latest first.
-pub fn history(history: &History, i: usize) -> Option<impl fmt::Display> {
-    let fault = i.checked_sub(1).map(|i| history.faults().nth(i));
-    // There is no line after the last fault.
-    (fault != Some(None)).then_some(fmt::from_fn(move |f| {
-        let hours = |s: u32| s as f32 / 3600.0;
-        let Some(fault) = fault.flatten() else {
-            let (powered, running) = (hours(history.powered_s), hours(history.running_s));
-            let starts = history.starts;
-            return write!(
-                f,
-                "powered {powered:.1} h, with current {running:.1} h, starts {starts}"
-            );
-        };
-        let (code, at) = (fault.code, hours(60 * fault.powered_min));
-        if code == CHANGED {
-            let key = u16::try_from(fault.running_s).ok().and_then(keys::find_id);
-            let name = key.map_or("a setting", Key::name);
-            return write!(f, "at {at:.1} h: the protective setting {name} was changed");
-        }
-        write!(f, "at {at:.1} h, with current {:.1} h: fault {code}", hours(fault.running_s))?;
-        let known = Fault::ALL.iter().find(|known| known.code() == code);
-        known.map_or(Ok(()), |known| write!(f, ", {known}"))
     }))
 }
 

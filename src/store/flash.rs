@@ -6,9 +6,6 @@ use crate::board;
 
 /// Number of slots, each of which holds one set of settings.
 pub const SLOTS: usize = 2;
-/// The slots of the history.
-pub const HISTORY: [usize; 2] = [SLOTS, SLOTS + 1];
-const _: () = assert!(HISTORY[1] < board::STORED_SLOTS);
 /// Double words in a slot.
 pub const SLOT_WORDS: usize = board::SETTINGS_SLOT_BYTES as usize / 8;
 

@@ -10,8 +10,7 @@ use super::*;
 use crate::monitor::record::Reason;
 use crate::settings::keys;
 
-mod fake;
-mod history;
+pub(crate) mod fake;
 mod older;
 
 use fake::Fake;

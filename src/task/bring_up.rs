@@ -24,6 +24,7 @@ use induction_drive::chip::window::Window;
 use induction_drive::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, stop, time};
 use induction_drive::commissioning::Session;
 use induction_drive::front::Front;
+use induction_drive::history::Hours;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::{Answer, Status};
 use induction_drive::modbus;
@@ -33,7 +34,6 @@ use induction_drive::recording::ring::Ring;
 use induction_drive::recording::trace::Trace;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
-use induction_drive::store::history::History;
 use induction_drive::store::{Loaded, Saved};
 use induction_drive::terminals;
 
@@ -88,7 +88,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
 
-    let mut start = load(Pages::new(chip.FLASH));
+    let mut start = load(Pages::new(chip.FLASH), dual_bank);
     start.settings.boot_pin_counts = board::boot_pin_counts(options);
     let timer = board::Timer::of(&start.settings.drive.inverter);
 
@@ -141,9 +141,9 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
         defmt::error!("the drive is not started, outputs stay off: {=str}", error);
     }
     // Only with a running control: without it the outputs stay off.
-    let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, chip.DBGMCU));
+    let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, chip.DBGMCU, &control::PERIODS));
     let front = make(front, || Front::new(start.settings));
-    let Start { saved, history, ref settings, rejected } = start;
+    let Start { saved, hours, ref settings, rejected } = start;
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
     if let Some(Rejected::Board(theirs)) = rejected {
@@ -153,8 +153,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
         Chip { cause, record, options, dual_bank, saved, rejected, timer, not_started, connected };
     let link = link.ok();
     let drive = &settings.drive;
-    let supervisor =
-        Supervisor::new(supervisor, link, watchdog, chip, history, commissioning, drive);
+    let supervisor = Supervisor::new(supervisor, link, watchdog, chip, hours, commissioning, drive);
     Ok(Board { front, port, line, contacts, supervisor })
 }
 
@@ -174,7 +173,7 @@ fn make<T>(place: &'static mut MaybeUninit<T>, value: impl FnOnce() -> T) -> &'s
 /// any of them.
 struct Start {
     saved: Saved<Pages>,
-    history: History,
+    hours: Hours,
     settings: FirmwareSettings,
     /// Reason why the saved settings were rejected, if they were.
     rejected: Option<Rejected>,
@@ -182,10 +181,10 @@ struct Start {
 
 /// The saved settings, or the defaults.
 #[inline(never)]
-fn load(pages: Pages) -> Start {
+fn load(pages: Pages, dual_bank: bool) -> Start {
     let defaults = FirmwareSettings::of_the_board();
     let (mut saved, loaded) = Saved::load(pages, &defaults);
-    let history = History::load(saved.flash());
+    let hours = Hours::load(saved.flash(), dual_bank);
     let (mut settings, mut rejected) = match loaded {
         Loaded::Settings(settings) => (settings, None),
         Loaded::Rejected(why) => (defaults, Some(why)),
@@ -195,7 +194,7 @@ fn load(pages: Pages) -> Start {
     if settings.check().is_err() {
         (settings, rejected) = (defaults, Some(Rejected::Refused));
     }
-    Start { saved, history, settings, rejected }
+    Start { saved, hours, settings, rejected }
 }
 
 impl Start {

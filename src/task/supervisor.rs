@@ -13,28 +13,25 @@ use drive_settings::{Scales, Settings, SettingsError};
 use crate::task::check::Check;
 use crate::task::clock::Clock;
 use crate::task::control;
-use crate::task::guard::{Guard, extended};
-use crate::task::hours::Hours;
 use crate::task::sources::Sources;
 use induction_drive::board;
 use induction_drive::chip::flash::Pages;
-use induction_drive::chip::watchdog::Watchdog;
+use induction_drive::chip::watchdog::{Guard, extended};
 use induction_drive::chip::{memory, over_voltage, pwm, start, stop, time};
 use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::Firmware;
 use induction_drive::desk::handle::{CommandError, DriveHandle};
+use induction_drive::history::{History, Hours};
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::record::{Reason, Record};
-use induction_drive::monitor::watchdog::{FeedRule, Verdict};
 use induction_drive::recording::ring::{self, Record as Period};
 use induction_drive::recording::trace::{self, Plan};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys::Key;
 use induction_drive::store::codec::Rejected;
-use induction_drive::store::history::History;
 use induction_drive::store::{FlashError, Saved};
 
 /// Version and commit of the firmware.
@@ -115,14 +112,12 @@ impl Supervisor {
     pub fn new<'a>(
         place: &'a mut MaybeUninit<Self>,
         link: Option<ControlLink>,
-        watchdog: Option<Watchdog>,
+        guard: Guard,
         chip: Chip,
-        history: History,
+        hours: Hours,
         commissioning: &'static mut Session,
         settings: &Settings,
     ) -> &'a mut Self {
-        let periods = control::PERIODS.load(Ordering::Relaxed);
-        let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(time::now(), periods)));
         let check = link.as_ref().and_then(|_| Check::new());
         place.write(Self {
             link,
@@ -132,7 +127,7 @@ impl Supervisor {
             guard,
             check,
             well: false,
-            hours: Hours::new(history, chip.dual_bank),
+            hours,
             chip,
             tracking: Tracking::new(settings),
             commissioning,
@@ -164,19 +159,8 @@ impl Supervisor {
     /// each pass of the main loop, and after long operations in it.
     pub fn feed_watchdog(&mut self) {
         self.check.iter_mut().for_each(Check::slice);
-        let Some((watchdog, rule)) = &mut self.guard else { return };
-        watchdog.run_in_halts();
-        let missed = control::MISSED.load(Ordering::Relaxed);
-        let periods = control::PERIODS.load(Ordering::Relaxed);
-        match rule.judge(time::now(), periods, missed) {
-            Verdict::Wait => {}
-            Verdict::Feed => watchdog.feed(),
-            // The watchdog is about to reset the chip. The main loop itself works, and the console answers until then.
-            Verdict::Refuse { periods, cycles } => {
-                pwm::outputs_off();
-                stop::keep(Reason::NotFed, [periods, cycles, u32::from(missed), 0]);
-            }
-        }
+        let Some(watchdog) = &mut self.guard else { return };
+        watchdog.feed(control::MISSED.load(Ordering::Relaxed));
         if self.clock.ms > board::WELL_AFTER_MS && !self.well {
             self.well = true;
             stop::forget_resets();

@@ -15,13 +15,14 @@ use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::Firmware;
 use induction_drive::desk::handle::{CommandError, DriveHandle};
+use induction_drive::history::History;
 use induction_drive::link::Status;
 use induction_drive::recording::ring::Record;
 use induction_drive::recording::trace::{self, Plan, Recorder, Sampled, Trace};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys::Key;
-use induction_drive::store::{FlashError, history::History};
+use induction_drive::store::FlashError;
 use motor_plant::Plant;
 
 /// The drive and its motor, see the head of the module.

@@ -14,6 +14,7 @@ use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{Firmware, Port};
 use induction_drive::desk::handle::{CommandError, DriveHandle};
+use induction_drive::history::History;
 use induction_drive::link::Status;
 use induction_drive::modbus;
 use induction_drive::modbus::settings::{Baud, Format, Settings as BusSettings};
@@ -24,7 +25,6 @@ use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys::Key;
 use induction_drive::store::FlashError;
-use induction_drive::store::history::History;
 use induction_drive::terminals::{self, Contacts};
 
 /// A drive without hardware.

@@ -17,9 +17,23 @@
 //! entries lasts 9.8 hours of continuous starting and stopping, and two pages of 10 000 erasures (datasheet) last 22 years; with a fault
 //! every minute besides, 6 years.
 
+#[cfg(target_os = "none")]
+mod hours;
+#[cfg(test)]
+mod tests;
+mod words;
+
 use heapless::Deque;
 
-use super::flash::{ERASED, Flash, FlashError, HISTORY, SLOT_WORDS, halves, newer, pair};
+use crate::board;
+use crate::store::{ERASED, Flash, FlashError, SLOT_WORDS, SLOTS, halves, newer, pair};
+#[cfg(target_os = "none")]
+pub use hours::Hours;
+pub use words::line;
+
+/// The slots of the history.
+const PAGES: [usize; 2] = [SLOTS, SLOTS + 1];
+const _: () = assert!(PAGES[1] < board::STORED_SLOTS);
 
 /// Number of faults that are kept.
 pub const FAULTS: usize = 16;
@@ -82,7 +96,7 @@ fn record(kind: u8, middle: u32, high: u32) -> u64 {
 impl History {
     /// Reads the log.
     pub fn load(flash: &mut impl Flash) -> Self {
-        let newest = newer(HISTORY.map(|slot| {
+        let newest = newer(PAGES.map(|slot| {
             let (magic, sequence) = halves(flash.read(slot, 0)?);
             (magic == MAGIC).then_some(sequence)
         }));
@@ -91,7 +105,7 @@ impl History {
         };
         let mut history = Self { page, sequence, next: 1, ..Self::default() };
         for word in 1..SLOT_WORDS {
-            let content = flash.read(HISTORY[page], word);
+            let content = flash.read(PAGES[page], word);
             if content != Some(ERASED) {
                 history.next = word + 1;
                 history.take(content.unwrap_or(0));
@@ -224,17 +238,17 @@ impl History {
     /// Begins the other page.
     fn turn(&mut self, flash: &mut impl Flash) -> Result<(), FlashError> {
         let (page, sequence) = (1 - self.page, self.sequence.wrapping_add(1));
-        flash.erase(HISTORY[page])?;
+        flash.erase(PAGES[page])?;
         let head =
             [record(STARTS, 0, self.starts), record(TIME, self.powered_s / 60, self.running_s)];
         let faults =
             self.faults.iter().map(|fault| record(fault.code, fault.powered_min, fault.running_s));
         let mut next = 1;
         for word in head.into_iter().chain(faults) {
-            flash.write(HISTORY[page], next, word)?;
+            flash.write(PAGES[page], next, word)?;
             next += 1;
         }
-        flash.write(HISTORY[page], 0, pair(MAGIC, sequence))?;
+        flash.write(PAGES[page], 0, pair(MAGIC, sequence))?;
         (self.page, self.sequence, self.next) = (page, sequence, next);
         self.written = (self.starts, self.running_s, self.powered_s);
         Ok(())
@@ -246,7 +260,7 @@ impl History {
         let mut result = Err(FlashError::Verify(self.next));
         for at in (self.next..SLOT_WORDS).take(2) {
             self.next = at + 1;
-            result = flash.write(HISTORY[self.page], at, word);
+            result = flash.write(PAGES[self.page], at, word);
             if result.is_ok() {
                 break;
             }

@@ -3,10 +3,10 @@
 use defmt::Display2Format;
 use drive_core::State;
 
-use crate::task::guard::{Guard, extended};
-use induction_drive::chip::flash::Pages;
-use induction_drive::store::FlashError;
-use induction_drive::store::history::History;
+use super::History;
+use crate::chip::flash::Pages;
+use crate::chip::watchdog::{Guard, extended};
+use crate::store::FlashError;
 
 /// The history, and the values for its next count.
 pub struct Hours {
@@ -22,8 +22,8 @@ pub struct Hours {
 
 impl Hours {
     /// Continues the history in the flash.
-    pub const fn new(history: History, dual_bank: bool) -> Self {
-        Self { history, counted_ms: 0, was_off: true, dual_bank }
+    pub fn load(pages: &mut Pages, dual_bank: bool) -> Self {
+        Self { history: History::load(pages), counted_ms: 0, was_off: true, dual_bank }
     }
 
     /// Counts up to this time, ms, and writes when that is due.

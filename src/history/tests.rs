@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::fake::Fake;
-use crate::store::history::{FAULTS, History, LONG_S, ON_S, SAME_FAULT_S};
+use super::{FAULTS, History, LONG_S, ON_S, SAME_FAULT_S};
+use crate::store::tests::fake::Fake;
 
 fn load(fake: &mut Fake) -> History {
     History::load(&mut &mut *fake)
