@@ -366,12 +366,6 @@ const _: () = {
 };
 /// Time without a valid line after which the port goes back to [`SERIAL_BAUD`], ms.
 pub const SERIAL_FALL_BACK_MS: u32 = 1000;
-/// Share of the port's bytes that a stream may take, %: the rest is for the lines of the console.
-pub const STREAM_SHARE: u32 = 80;
-/// Size of the receive queue, bytes; it holds one byte less, 22 ms at full rate. The main loop reads it a thousand times as often.
-pub const SERIAL_RECEIVE: usize = 256;
-/// Size of the transmit queue, bytes; it holds one byte less. The longest line waits 39 ms at most.
-pub const SERIAL_TRANSMIT: usize = 448;
 /// Records of the longest trace, 32 bytes each.
 pub const TRACE_RECORDS: usize = 1024;
 /// Size of the ring of control periods for stream, identification and commissioning in the main loop. It holds one less: 5.2 ms if every

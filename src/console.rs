@@ -13,6 +13,8 @@ pub mod handle;
 pub mod line;
 mod list;
 mod number;
+#[cfg(target_os = "none")]
+mod port;
 mod reply;
 pub mod restore;
 mod status;
@@ -32,6 +34,8 @@ use grammar::ParseError;
 use handle::{Firmware, Port};
 use line::{LineError, LineReader, OutputLine};
 use list::List;
+#[cfg(target_os = "none")]
+pub use port::Lpuart;
 use restore::Restore;
 use stream::Wire;
 

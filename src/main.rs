@@ -6,7 +6,7 @@
 //! * [`main`], once: clocks, serial port, encoder, power stage with all switches off, ADCs, the drive (`task/bring_up.rs`).
 //! * the control interrupt (`task/control.rs`), 6000 times a second, at the highest priority: samples in,
 //!   `Drive::step`, compare values out, then one command from the console if there is one.
-//! * the interrupts of the serial port (`chip/serial.rs`) and of the field bus (`modbus/port.rs`): a byte in, a byte out.
+//! * the interrupts of the serial port (`console/port.rs`) and of the field bus (`modbus/port.rs`): a byte in, a byte out.
 //! * the loop at the end of `main`, between interrupts: command arbiter, console and field bus (`front.rs`), the log ten times a second,
 //!   the tracking of the rotor time constant (`task/supervisor.rs`), the check of the control's memory and registers (`task/check.rs`),
 //!   and the cross-checks of clock and reference voltage (`task/sources.rs`).

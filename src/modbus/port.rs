@@ -15,8 +15,7 @@ use stm32g4xx_hal::stm32::interrupt;
 
 use crate::boards::pin::{Pin, USART3_RX, USART3_TX};
 use crate::boards::{Level, Rs485};
-use crate::chip::pins;
-use crate::chip::serial::PRIORITY;
+use crate::chip::{LOWEST_PRIORITY, pins};
 use crate::link::mailbox::{Mailbox, Receiver, Sender};
 use crate::modbus::settings::{Baud, Format, Settings};
 use crate::modbus::slave::{self, Written};
@@ -102,7 +101,7 @@ impl Usart {
         unsafe { *INTERRUPT_END.0.get() = Some(end) };
         // SAFETY: no critical section relies on the priority or the mask of this interrupt.
         unsafe {
-            nvic.set_priority(Interrupt::USART3, PRIORITY);
+            nvic.set_priority(Interrupt::USART3, LOWEST_PRIORITY);
             NVIC::unmask(Interrupt::USART3);
         }
         Some(Self { received, to_send })

@@ -5,13 +5,15 @@ use core::fmt;
 use drive_core::io::PERIOD_S;
 use drive_settings::Settings;
 use drive_stream::{Frame, LONGEST, MOST_SIGNALS, wire_bytes};
-use thiserror::Error;
 
 use super::ring::Record;
 use super::trace::{self, SIGNALS, SignalChoice};
 use crate::board;
 
 const _: () = assert!(trace::MOST == MOST_SIGNALS);
+
+/// Share of the port's bytes that a stream may take, %: the rest is for the lines of the console.
+const STREAM_SHARE: u32 = 80;
 
 /// A requested stream.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,27 +44,23 @@ impl Default for Frames {
     }
 }
 
-/// Reason why a stream is refused.
-#[derive(Debug, Error)]
-#[error("the stream needs {wanted} bytes/s; {baud} baud has room for {room}: `baud`, or fewer")]
-pub struct TooMuch {
-    wanted: u32,
-    baud: u32,
-    room: u32,
-}
-
 impl Frames {
     /// Begins a stream at a port with this rate, bits per second.
     ///
     /// # Errors
     /// The frames do not fit.
-    pub fn begin(&mut self, stream: Stream, baud: u32) -> Result<(), TooMuch> {
+    pub fn begin(&mut self, stream: Stream, baud: u32) -> Result<(), impl fmt::Display + use<>> {
         let rate = board::PWM_HZ / u32::from(stream.divider).max(1);
         let wanted = rate * wire_bytes(stream.choice.signals().count()) as u32;
         // Ten bits a byte.
-        let room = baud / 10 * board::STREAM_SHARE / 100;
+        let room = baud / 10 * STREAM_SHARE / 100;
         if wanted > room {
-            return Err(TooMuch { wanted, baud, room });
+            return Err(fmt::from_fn(move |f| {
+                write!(
+                    f,
+                    "the stream needs {wanted} bytes/s; {baud} baud has room for {room}: `baud`, or fewer"
+                )
+            }));
         }
         *self = Self { stream: Some(stream), ..Self::default() };
         Ok(())

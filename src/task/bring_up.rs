@@ -17,12 +17,12 @@ use induction_drive::board;
 use induction_drive::boards::SELECTED;
 use induction_drive::chip::StartError;
 use induction_drive::chip::flash::Pages;
-use induction_drive::chip::serial::Port;
 use induction_drive::chip::stage::Stage;
 use induction_drive::chip::watchdog::Watchdog;
 use induction_drive::chip::window::Window;
 use induction_drive::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, stop, time};
 use induction_drive::commissioning::Session;
+use induction_drive::console::Lpuart;
 use induction_drive::front::Front;
 use induction_drive::history::Hours;
 use induction_drive::link::mailbox::Mailbox;
@@ -42,7 +42,7 @@ pub struct Board<'a> {
     /// Command arbiter, console and field bus, with the saved settings, or the defaults.
     pub front: &'static mut Front,
     /// The serial port of the console.
-    pub port: Port,
+    pub port: Lpuart,
     /// The port of the field bus, if the board has one.
     pub line: Option<modbus::Usart>,
     /// The terminals, with the slow analog inputs.
@@ -105,7 +105,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     }
     let dc_link = dc_link::DcLink::new(chip.TIM8, &mut rcc, &chip.DBGMCU);
     let clock_hz = if clocked.is_ok() { board::CLOCK_HZ } else { board::HSI_HZ };
-    let port = Port::new(chip.LPUART1, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
+    let port = Lpuart::new(chip.LPUART1, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
     let line = SELECTED
         .bus
         .and_then(|wires| modbus::Usart::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));

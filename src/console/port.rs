@@ -12,24 +12,26 @@ use stm32g4xx_hal::pac::{self, Interrupt};
 use stm32g4xx_hal::rcc::Rcc;
 use stm32g4xx_hal::stm32::interrupt;
 
-use super::pins;
+use super::handle;
 use crate::board;
 use crate::boards::Level;
 use crate::boards::pin::pa;
-use crate::console::handle;
+use crate::chip::{LOWEST_PRIORITY, pins};
 
-type ReceiveQueue = Queue<u8, { board::SERIAL_RECEIVE }>;
-type TransmitQueue = Queue<u8, { board::SERIAL_TRANSMIT }>;
+/// Size of the receive queue, bytes; it holds one byte less, 22 ms at full rate. The main loop reads it a thousand times as often.
+const RECEIVE: usize = 256;
+/// Size of the transmit queue, bytes; it holds one byte less. The longest line waits 39 ms at most.
+const TRANSMIT: usize = 448;
+type ReceiveQueue = Queue<u8, RECEIVE>;
+type TransmitQueue = Queue<u8, TRANSMIT>;
 
 /// Bytes that each FIFO holds (RM0440, LPUART implementation).
 const FIFO: u32 = 8;
-/// Priority of the interrupt: the lowest. Only the four upper bits are implemented (datasheet).
-pub const PRIORITY: u8 = 0xf0;
 
 /// The main loop's end of the port.
-pub struct Port {
-    received: Consumer<'static, u8, { board::SERIAL_RECEIVE }>,
-    to_send: Producer<'static, u8, { board::SERIAL_TRANSMIT }>,
+pub struct Lpuart {
+    received: Consumer<'static, u8, RECEIVE>,
+    to_send: Producer<'static, u8, TRANSMIT>,
     /// Clock of the port, Hz.
     clock_hz: u32,
 }
@@ -37,8 +39,8 @@ pub struct Port {
 /// The interrupt's end of the port.
 struct PortInterrupt {
     port: pac::LPUART1,
-    received: Producer<'static, u8, { board::SERIAL_RECEIVE }>,
-    to_send: Consumer<'static, u8, { board::SERIAL_TRANSMIT }>,
+    received: Producer<'static, u8, RECEIVE>,
+    to_send: Consumer<'static, u8, TRANSMIT>,
     /// The BRR register in force.
     divider: u32,
 }
@@ -46,7 +48,7 @@ struct PortInterrupt {
 /// The interrupt's own memory.
 struct Owned(UnsafeCell<Option<PortInterrupt>>);
 
-// SAFETY: `Port::new` writes it before it unmasks the interrupt, once, because it takes the port;
+// SAFETY: `Lpuart::new` writes it before it unmasks the interrupt, once, because it takes the port;
 // after that only the interrupt touches it.
 unsafe impl Sync for Owned {}
 
@@ -58,7 +60,7 @@ static DAMAGED: AtomicBool = AtomicBool::new(false);
 static DIVIDER: AtomicU32 = AtomicU32::new(0);
 static IN_FORCE: AtomicU32 = AtomicU32::new(0);
 
-impl Port {
+impl Lpuart {
     /// Sets the port up, with its clock in Hz; `None` on a second call.
     pub fn new(port: pac::LPUART1, nvic: &mut NVIC, rcc: &mut Rcc, clock_hz: u32) -> Option<Self> {
         let received = cortex_m::singleton!(: ReceiveQueue = Queue::new())?;
@@ -82,14 +84,14 @@ impl Port {
         unsafe { *INTERRUPT_END.0.get() = Some(end) };
         // SAFETY: no critical section relies on the priority or the mask of this interrupt.
         unsafe {
-            nvic.set_priority(Interrupt::LPUART, PRIORITY);
+            nvic.set_priority(Interrupt::LPUART, LOWEST_PRIORITY);
             NVIC::unmask(Interrupt::LPUART);
         }
         Some(Self { received, to_send, clock_hz })
     }
 }
 
-impl handle::Port for Port {
+impl handle::Port for Lpuart {
     fn read(&mut self) -> Option<u8> {
         self.received.dequeue()
     }
