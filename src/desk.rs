@@ -15,15 +15,14 @@ mod stage_faults;
 mod tests;
 
 use drive_commission::Step;
-use drive_core::homing::{Failure, Homing, Next, Plan, Seen};
 use drive_core::learned::Learned;
 use drive_core::{Accepted, Command, Mode, Refused, State, Stop};
 use drive_settings::entry::Change;
 
-use crate::ModuleState;
 use crate::settings::FirmwareSettings;
 use crate::settings::staging::{Applied, Assignments, Staging, guarded};
 use crate::settings::{BUS_SILENT_S, Commander};
+use crate::{Homing, ModuleState};
 use handle::{CommandError, DriveHandle};
 use news::{Announcer, News};
 use order::{LOADER_DC_LINK_V, Order, Refusal, Reply};
@@ -86,9 +85,7 @@ pub struct Desk {
     rejected_learning: Option<Learned>,
     /// Whether a self-commissioning has ended that is not announced yet.
     learned: bool,
-    /// A homing, and the result of the last one until it is announced.
-    homing: Option<Homing>,
-    homed: Option<Result<(), Failure>>,
+    homing: Homing,
     /// The last refusal of bus or terminals, and its source if it is still to be announced.
     refusal: Option<Refusal>,
     refused: Option<Commander>,
@@ -119,8 +116,7 @@ impl Desk {
             checking: None,
             rejected_learning: None,
             learned: false,
-            homing: None,
-            homed: None,
+            homing: Homing::default(),
             refusal: None,
             refused: None,
             modules: ModuleState::default(),
@@ -194,9 +190,7 @@ impl Desk {
             self.rejected_learning = Some(*result).filter(|result| !result.verdict.is_accepted());
             self.learned = true;
         });
-        if let Some(homed) = self.go_on_homing(drive) {
-            self.homed = Some(homed);
-        }
+        self.homing.poll(drive);
     }
 
     /// The speed of the shaft.
@@ -236,7 +230,7 @@ impl Desk {
         self.announcer
             .next(&status, settings, now_ms)
             .or_else(|| drive.session().news().map(News::Commissioning))
-            .or_else(|| self.homed.take().map(News::Homed))
+            .or_else(|| self.homing.news().map(News::Homed))
             .or_else(|| self.refused.take().map(News::Refused))
     }
 
@@ -249,29 +243,6 @@ impl Desk {
             self.unsaved = true;
             self.checking = None;
         }
-    }
-
-    /// Continues a homing; returns its result when it has ended.
-    fn go_on_homing(&mut self, drive: &mut impl DriveHandle) -> Option<Result<(), Failure>> {
-        let (homing, status) = (self.homing.as_mut()?, drive.status()?);
-        let seen = Seen {
-            periods: status.periods,
-            state: status.state,
-            turns: status.telemetry.turns,
-            i_q: status.telemetry.reference.q,
-            room: status.torque_limits.i_q,
-        };
-        let outcome = match homing.poll(&seen) {
-            Next::Wait => return None,
-            Next::Command(command) => {
-                // The drive refuses it if it has just stopped: the next report says so.
-                let _ = drive.command(command);
-                return None;
-            }
-            Next::Ended(outcome) => outcome,
-        };
-        self.homing = None;
-        Some(outcome)
     }
 
     /// Carries out a request, or accepts it as a task ([`Reply::Designing`]).
@@ -311,10 +282,13 @@ impl Desk {
             Order::Speed(rpm) => give(Command::Speed(rpm), "rpm", drive),
             Order::Jog(rpm) => give(Command::Jog(rpm), "rpm", drive),
             Order::Position(turns) => {
-                self.homing = None;
+                self.homing.cancel();
                 give(Command::Position(turns), "turns", drive)
             }
-            Order::Home(plan) => self.home(plan, drive),
+            Order::Home(plan) => {
+                let limit_a = self.settings.in_force().drive.current_limit_a();
+                self.homing.begin(plan, limit_a, drive).map(|()| Reply::Done)
+            }
             Order::Clear => self.clear(drive),
             Order::Defaults => {
                 may_stage(drive)?;
@@ -620,14 +594,6 @@ impl Desk {
         let found = drive.session().found(&self.settings.latest().drive);
         self.settings.stage(found.ok_or(Refusal::NothingFound)?);
         self.design(from, Order::Save, drive)
-    }
-
-    /// Starts the search for a stop of the shaft.
-    fn home(&mut self, plan: Plan, drive: &mut impl DriveHandle) -> Answer {
-        let homing = Homing::new(plan, self.settings.in_force().drive.current_limit_a())?;
-        drive.command(homing.begin())?;
-        self.homing = Some(homing);
-        Ok(Reply::Done)
     }
 
     fn reboot(

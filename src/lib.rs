@@ -17,7 +17,9 @@ pub mod desk;
 pub mod front;
 mod hash;
 pub mod history;
+pub mod homing;
 pub mod link;
+pub mod log;
 pub mod monitor;
 pub mod recording;
 pub mod rotor_tracking;
@@ -63,6 +65,9 @@ pub struct ModuleSettings {
 
 /// State of the modules that command arbiter and console look at: that of the terminals.
 pub type ModuleState = terminals::Interlock;
+
+/// The homing of the command arbiter.
+pub type Homing = homing::Homing;
 
 // The fuzz targets share a file of the tests, which names the library from outside.
 #[cfg(test)]

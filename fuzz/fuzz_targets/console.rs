@@ -6,9 +6,10 @@ use std::sync::LazyLock;
 
 use drive_core::learned::{Learned, Verdict};
 use drive_core::{Measured, State};
-use induction_drive::console::grammar::{COMMANDS, LEVELS};
+use induction_drive::console::grammar::COMMANDS;
 use induction_drive::console::line::UNASKED;
 use induction_drive::front::Front;
+use induction_drive::log::LEVELS;
 use induction_drive::recording::trace::SIGNALS;
 use induction_drive::settings::keys;
 use induction_drive_fuzz::START;

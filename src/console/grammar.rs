@@ -24,7 +24,7 @@ use crate::settings::staging::{Assignments, MOST};
 pub use commands::NUMBERS;
 pub use commands::{COMMANDS, HELP, HELP_END};
 pub use error::{ParseError, TagError};
-pub use request::{LEVELS, Level, ListKind, Request, WORDS_IN_LINE};
+pub use request::{ListKind, Request, WORDS_IN_LINE};
 
 /// Most records of a trace.
 const LONGEST_TRACE: u16 = board::TRACE_RECORDS as u16;

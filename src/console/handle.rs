@@ -2,9 +2,9 @@
 
 use core::fmt::{self, Write};
 
-use super::grammar::Level;
 use crate::desk::handle::DriveHandle;
 use crate::history::History;
+use crate::log::Level;
 use crate::recording::ring::Record;
 use crate::recording::trace::{self, Plan};
 use crate::rotor_tracking::Report;

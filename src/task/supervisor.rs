@@ -4,11 +4,9 @@ use core::fmt;
 use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
-use defmt::Display2Format;
-use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
-use drive_core::{Accepted, Coefficients, Command, Fault, Hardware};
-use drive_settings::{Scales, Settings, SettingsError};
+use drive_core::{Accepted, Coefficients, Command};
+use drive_settings::{Settings, SettingsError};
 
 use crate::task::check::Check;
 use crate::task::clock::Clock;
@@ -19,12 +17,12 @@ use induction_drive::chip::flash::Pages;
 use induction_drive::chip::watchdog::{Guard, extended};
 use induction_drive::chip::{memory, over_voltage, pwm, start, stop, time};
 use induction_drive::commissioning::Session;
-use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::Firmware;
 use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::history::{History, Hours};
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::{Answer, Status};
+use induction_drive::log::{Level, Log};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::recording::ring::{self, Record as Period};
 use induction_drive::recording::trace::{self, Plan};
@@ -67,7 +65,7 @@ pub struct Supervisor {
     /// `None` if the control does not run.
     link: Option<ControlLink>,
     status: Option<Status>,
-    level: Level,
+    log: Log,
     clock: Clock,
     guard: Guard,
     /// Check of memory and registers; `None` if the control does not run.
@@ -80,8 +78,6 @@ pub struct Supervisor {
     /// The commissioning. (Large, so not on the stack.)
     commissioning: &'static mut Session,
     hours: Hours,
-    /// Scales and pole pairs of the settings in force, for the log.
-    scales: (Scales, u8),
 }
 
 /// State of the chip at start, and the saved settings.
@@ -122,7 +118,7 @@ impl Supervisor {
         place.write(Self {
             link,
             status: None,
-            level: Level::Info,
+            log: Log::new(settings),
             clock: Clock::new(),
             guard,
             check,
@@ -131,7 +127,6 @@ impl Supervisor {
             chip,
             tracking: Tracking::new(settings),
             commissioning,
-            scales: (settings.scales, settings.motor.pole_pairs),
         })
     }
 
@@ -144,7 +139,7 @@ impl Supervisor {
             && let Some(status) = link.status.take()
         {
             let newest = link.reported.by_ref().last().unwrap_or_default();
-            self.log(Status { telemetry: newest.telemetry, ..status });
+            self.report(Status { telemetry: newest.telemetry, ..status });
         }
         self.commission();
         // The commissioning designs for seconds, and the console needs the time after that.
@@ -214,53 +209,18 @@ impl Supervisor {
         }
     }
 
-    /// Logs changes of state, faults and events; once a second, at the level `debug`, the drive's operating point.
-    fn log(&mut self, mut s: Status) {
+    /// Takes a report of the control: logs it, and keeps faults for the next boot and in the history.
+    fn report(&mut self, mut s: Status) {
         s.worst_latency = s.worst_latency.saturating_sub(self.chip.timer.below_the_top());
         let before = self.status.replace(s);
-        if before.map(|status| status.state) != Some(s.state) {
-            if let Some(fault) = s.state.fault() {
-                stop::keep(Reason::Drive, [u32::from(fault.code()), 0, 0, 0]);
-                if self.level >= Level::Error {
-                    defmt::error!("fault {}: {}", fault.code(), fault.text());
-                }
-            } else if self.level >= Level::Info {
-                defmt::info!("state: {}", Display2Format(&s.state));
-            }
+        let is_new = before.map(|status| status.state) != Some(s.state);
+        if let Some(fault) = s.state.fault().filter(|_| is_new) {
+            stop::keep(Reason::Drive, [u32::from(fault.code()), 0, 0, 0]);
+        }
+        self.log.report(before.as_ref(), &s);
+        if is_new {
             // Called last, because it writes to the flash for milliseconds.
             self.hours.entered(s.state, &mut self.guard, self.chip.saved.flash());
-        }
-        // An event that lasts is logged once.
-        let known = before.map_or(Hardware::empty(), |status| status.hardware);
-        if self.level >= Level::Warn {
-            for (event, text) in [
-                (Hardware::BREAK, "the power stage pulls the break input, or is not there"),
-                (Hardware::ANALOG_WATCHDOG, "over-current at an ADC"),
-                (Hardware::DEADLINE_MISS, "a control period took too long"),
-                (Hardware::CONVERTER_OVERRUN, "a conversion was lost"),
-                (Hardware::CHOPPER_OFF, "the chip has switched the brake chopper off"),
-                (Hardware::CLOCK, Fault::WrongClock.text()),
-                (Hardware::REFERENCE, Fault::WrongReference.text()),
-            ] {
-                if (s.hardware - known).intersects(event) {
-                    defmt::warn!("{}", text);
-                }
-            }
-        }
-        let second = |status: &Status| status.periods / board::PWM_HZ;
-        if self.level >= Level::Debug && before.is_none_or(|last| second(&last) != second(&s)) {
-            let (scales, pole_pairs) = &self.scales;
-            let rpm = s.telemetry.rotor_freq * (60.0 / PERIOD_S) / f32::from(*pole_pairs);
-            defmt::debug!(
-                "{}: i_d {} A, i_q {} A, speed {} rpm, dc link {} V, heat sink {} degC, {} cycles",
-                Display2Format(&s.state),
-                s.telemetry.current.d,
-                s.telemetry.current.q,
-                rpm,
-                scales.dc_link.at(s.sample.dc_link),
-                scales.ntc.celsius(s.sample.heat_sink),
-                s.worst_cycles[0],
-            );
         }
     }
 }
@@ -311,7 +271,7 @@ impl DriveHandle for Supervisor {
     fn configured(&mut self, settings: &FirmwareSettings) {
         self.tracking = Tracking::new(&settings.drive);
         self.commissioning.configured(&settings.drive);
-        self.scales = (settings.drive.scales, settings.drive.motor.pole_pairs);
+        self.log.configured(&settings.drive);
     }
 
     fn connect(&mut self) {
@@ -388,7 +348,7 @@ impl Firmware for Supervisor {
     }
 
     fn set_log_level(&mut self, level: Level) {
-        self.level = level;
+        self.log.level = level;
     }
 
     fn stack(&self) -> (usize, usize) {

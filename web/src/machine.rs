@@ -12,11 +12,11 @@ use drive_core::{
 use drive_settings::SettingsError;
 use induction_drive::board::TRACE_RECORDS;
 use induction_drive::commissioning::Session;
-use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::Firmware;
 use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::history::History;
 use induction_drive::link::Status;
+use induction_drive::log::Level;
 use induction_drive::recording::ring::Record;
 use induction_drive::recording::trace::{self, Plan, Recorder, Sampled, Trace};
 use induction_drive::rotor_tracking::{Report, Tracking};

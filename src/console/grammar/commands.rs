@@ -4,7 +4,7 @@ use drive_commission::Step;
 use drive_core::{Mode, Stop, homing};
 
 use super::backup::{hexadecimal, restore};
-use super::request::{LEVELS, ListKind, Request};
+use super::request::{ListKind, Request};
 use super::{
     ParseError, Words, assigned, assignments, fault, prefix, recording, setting, step, whole,
 };
@@ -12,6 +12,7 @@ use crate::board;
 use crate::boards;
 use crate::console::suggest::nearest;
 use crate::desk::order::Order;
+use crate::log::LEVELS;
 use crate::settings::keys;
 
 /// Rows of `NUMBER: WORD, [ARGUMENTS, MEANING], ... => REQUEST;`, in the order of `help`. A number is never used again.

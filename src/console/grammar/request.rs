@@ -4,6 +4,7 @@ use drive_core::Fault;
 use heapless::Vec;
 
 use crate::desk::order::Order;
+use crate::log::Level;
 use crate::recording::stream::Stream;
 use crate::recording::trace::Plan;
 use crate::settings::keys::Key;
@@ -87,27 +88,3 @@ pub enum ListKind {
     /// The signals and the layout of a frame.
     Signals,
 }
-
-/// Level of the log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
-    /// Nothing.
-    Off,
-    /// Faults.
-    Error,
-    /// Events that need attention as well.
-    Warn,
-    /// Changes of state as well.
-    Info,
-    /// The drive's operating point, once a second, as well.
-    Debug,
-}
-
-/// Names of the levels, in order.
-pub const LEVELS: [(&str, Level); 5] = [
-    ("off", Level::Off),
-    ("error", Level::Error),
-    ("warn", Level::Warn),
-    ("info", Level::Info),
-    ("debug", Level::Debug),
-];

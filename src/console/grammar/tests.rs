@@ -3,6 +3,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::desk::order::Order;
+use crate::log::Level;
 use crate::recording::trace::Plan;
 use crate::recording::trace::{self, SignalChoice, Trigger};
 
