@@ -8,6 +8,7 @@
 
 mod announce;
 mod answer;
+mod board;
 pub mod grammar;
 pub mod handle;
 pub mod line;
@@ -22,6 +23,7 @@ mod stream;
 mod suggest;
 #[cfg(test)]
 pub(crate) mod tests;
+pub mod words;
 
 use core::fmt;
 

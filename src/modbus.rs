@@ -9,6 +9,7 @@ pub mod faults;
 pub mod float;
 #[cfg(target_os = "none")]
 mod port;
+mod refusals;
 pub mod registers;
 pub mod settings;
 pub mod slave;

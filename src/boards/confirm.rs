@@ -1,39 +1,9 @@
-//! Assumptions of a board, and the number that confirms it.
+//! The number that confirms a board.
 
-use super::{Board, Currents, Source};
+use super::{Board, Currents};
 use crate::hash;
 
 impl Board {
-    /// The assumed items, each with the bench step that shows whether it holds.
-    pub fn assumptions(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
-        self.sources().into_iter().filter_map(|(item, source)| match source? {
-            Source::Assumed(step) => Some((item, step)),
-            Source::Read(_) => None,
-        })
-    }
-
-    /// The items of the power stage with their sources; the source is `None` for an item that the board does not have.
-    pub fn sources(&self) -> [(&'static str, Option<Source>); 15] {
-        let Currents { a, b, shunts } = &self.currents;
-        [
-            ("high sides: level that switches on", Some(self.high.on_at.source)),
-            ("low sides: level that switches on", Some(self.low.on_at.source)),
-            ("fault input: level that trips", Some(self.fault.trips_at.source)),
-            ("fault input: resistor", Some(self.fault.pull_ohm.source)),
-            ("dead time", Some(self.dead_time_s.source)),
-            ("scale of current a", Some(a.line.source)),
-            ("scale of current b", Some(b.line.source)),
-            ("scale of current c", shunts.map(|shunts| shunts.c.line.source)),
-            ("settling of the shunts", shunts.map(|shunts| shunts.settle_s.source)),
-            ("scale of the dc link", Some(self.dc_link.line.source)),
-            ("maximum operating voltage", Some(self.dc_link_limits.operation.source)),
-            ("switches withstand", Some(self.dc_link_limits.switches.source)),
-            ("capacitors withstand", Some(self.dc_link_limits.capacitors.source)),
-            ("over-current shut-down", self.over_current.map(|shut_down| shut_down.source)),
-            ("thermistor", Some(self.ntc.source)),
-        ]
-    }
-
     /// The number that a confirmation saves. It covers the board's name, its values, and the words of the settings that are `in_force`
     /// beside them, so that it does not hold for other values. Never 0.
     pub fn confirmation(&self, in_force: impl Iterator<Item = u32>) -> u32 {

@@ -7,12 +7,12 @@ use drive_core::State;
 use super::grammar::{ListKind, Request};
 use super::handle::Firmware;
 use super::number::Significant;
+use super::words::UNCONFIRMED;
 use super::{Console, reply};
 use crate::desk::order::Reply;
 use crate::desk::{Answer, Desk, may_stage};
 use crate::recording::trace::{Plan, SIGNALS, Trigger};
 use crate::settings::Commander;
-use crate::settings::staging::UNCONFIRMED;
 
 /// Significant digits of a limited set-point.
 const DIGITS: usize = 4;

@@ -7,12 +7,12 @@ use drive_settings::Settings;
 use drive_settings::entry::Change;
 use drive_settings::value::Value;
 
-use super::Console;
 use super::grammar::{HELP, HELP_END, ListKind};
 use super::handle::Firmware;
 use super::number::Significant;
 use super::reply::{self, Description, Setting};
 use super::restore;
+use super::{Console, board};
 use crate::desk::Desk;
 use crate::history;
 use crate::recording::stream;
@@ -58,7 +58,7 @@ impl Console {
             ListKind::Describe(prefix) => setting_from(line, prefix)
                 .map(|(key, next)| say(&Description::new(key, desk.settings()), next)),
             ListKind::Backup => self.backup(line, settings),
-            ListKind::Board => reply::board(settings, line).map(|text| say(&text, next + 1)),
+            ListKind::Board => board::line(settings, line).map(|text| say(&text, next + 1)),
             ListKind::Fault(fault) => reply::fault(fault, line).map(|text| say(&text, next + 1)),
             ListKind::History => {
                 history::line(drive.history(), line).map(|text| say(&text, next + 1))

@@ -115,33 +115,6 @@ impl fmt::Display for Description {
     }
 }
 
-/// The boot pin at a reset, by whether it counts. ST's loader holds PA9, a gate, at a high level (AN2606).
-const BOOT_PIN: [&str; 2] = [
-    "boot pin: not in use (option bytes nSWBOOT0 = 0, nBOOT0 = 1)",
-    "boot pin: PB8 high at a reset starts ST's loader, which switches a gate on (PA9): 10 kOhm from PB8 to ground; \
-     `STM32_Programmer_CLI -c port=SWD -ob nSWBOOT0=0 nBOOT0=1`, or in OpenOCD \
-     `stm32l4x option_write 0 0x20 0x08000000 0x0c000000; stm32l4x option_load 0`, ends that",
-];
-
-/// Line number `i` of the text of the board: its name, its assumptions with the bench step for each, the boot pin, and whether all of it
-/// is confirmed.
-pub fn board(settings: &FirmwareSettings, i: usize) -> Option<impl fmt::Display> {
-    let (board, boot_pin) = (settings.board, usize::from(settings.boot_pin_counts));
-    let confirmed = settings.board_is_confirmed();
-    let count = board.assumptions().count();
-    (i < count + 3).then_some(fmt::from_fn(move |f| {
-        if i == 0 {
-            return write!(f, "board {}: {}", board.name, board.title);
-        }
-        match board.assumptions().nth(i - 1) {
-            Some((item, step)) => write!(f, "assumed {item}; bench: {step}"),
-            None if i == count + 1 => f.write_str(BOOT_PIN[boot_pin]),
-            None if confirmed => f.write_str("confirmed"),
-            None => f.write_str("not confirmed: the drive does not start; `confirm board` when all bench steps are done"),
-        }
-    }))
-}
-
 /// Line number `i` of the text of a fault, after its first line: the causes, the likely ones first, and the cure.
 pub fn fault(fault: Fault, i: usize) -> Option<impl fmt::Display> {
     let causes = fault.causes();

@@ -15,13 +15,10 @@ use crate::store::FlashError;
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum CommandError {
     /// The drive refuses it.
-    #[error("{0}")]
     Refused(Refused),
     /// The control interrupt does not run.
-    #[error("the control does not run")]
     NoAnswer,
     /// The control was not started, for this reason.
-    #[error("the control does not run: {0}")]
     NotStarted(&'static str),
 }
 

@@ -2,7 +2,7 @@
 
 use drive_commission::Step;
 use drive_core::homing::{OutOfRange, Plan};
-use drive_core::{Mode, Refused, Stop};
+use drive_core::{Mode, Stop};
 use drive_settings::SettingsError;
 use thiserror::Error;
 
@@ -131,25 +131,18 @@ pub enum Reply {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum Refusal {
     /// The drive refuses it, or does not answer.
-    #[error(transparent)]
     Command(#[from] CommandError),
     /// The drive is not off.
-    #[error("the drive must be off: `stop` first")]
     MustBeOff,
     /// Another side commands.
-    #[error("{}", AUTHORITY[*.0 as usize])]
     Authority(Commander),
     /// The controllers cannot be designed for the staged settings.
-    #[error("{0}; not in force, still staged")]
     Design(SettingsError),
     /// A value was not staged.
-    #[error(transparent)]
     Set(#[from] SetError),
     /// The settings were not saved.
-    #[error(transparent)]
     Flash(#[from] FlashError),
     /// Settings of another board.
-    #[error("these lines belong to the board {theirs}, this is {own}; `revert` drops them")]
     WrongBoard {
         /// The board of the lines.
         theirs: &'static str,
@@ -157,9 +150,6 @@ pub enum Refusal {
         own: &'static str,
     },
     /// The settings in the flash are of another board.
-    #[error(
-        "this image is for the board {own}, the saved settings are of {theirs}: flash the image of {theirs}; only if this is a {own}: `defaults`, bench steps, `confirm board`"
-    )]
     SavedOn {
         /// The board of the settings.
         theirs: &'static str,
@@ -167,83 +157,32 @@ pub enum Refusal {
         own: &'static str,
     },
     /// The board is not confirmed.
-    #[error(
-        "the board's polarities, dead time and scales are assumed, or were changed: do the bench steps that `board` lists, then `confirm board`"
-    )]
     NotConfirmed,
     /// Values are staged.
-    #[error("there are staged values: `apply` or `revert` first")]
     Staged,
     /// The commissioning has found nothing new.
-    #[error("nothing new was found: `commission` first")]
     NothingFound,
     /// There are no learned values to add to.
-    #[error("nothing is learned with these settings: `learn` first")]
     NothingLearned,
     /// A number of a homing is out of range.
-    #[error(transparent)]
     Homing(#[from] OutOfRange),
     /// Changes would be lost.
-    #[error("settings that were not saved would be lost: `save` first, or `reboot now`")]
     Unsaved,
     /// The dc link, V, is charged.
-    #[error(
-        "the dc link has {0:.0} V, and ST's loader drives a gate: {LOADER_DC_LINK_V} V at most"
-    )]
     Charged(f32),
     /// The bus tries to set a setting of the hardware.
-    #[error("{} belongs to the hardware: set it at the console", .0.name())]
     Hardware(Key),
     /// The bus repeats its run command after a stop from another source.
-    #[error("the drive has stopped for another reason: write a stop first")]
     Ended,
     /// A module does not let the drive run.
-    #[error("{0}")]
     Held(&'static str),
     /// A stop came before the controllers for a start were designed.
-    #[error("a stop came before the start")]
     Stopped,
     /// A fault of the power stage is not cleared for this number of seconds.
-    #[error(
-        "three faults of the power stage within 10 s: find the short circuit or the wrong wire; `clear` works in {0} s"
-    )]
     TooOften(u32),
     /// The reference of a module was lost.
-    #[error("the reference is lost, {0}; close RESET or `clear`, then start anew")]
     Reference(&'static str),
 }
 
 /// Highest dc link voltage with ST's loader, V.
 pub const LOADER_DC_LINK_V: f32 = 20.0;
-
-/// Texts of a refusal, by the side that commands, in the order of [`Commander`].
-const AUTHORITY: [&str; 3] = [
-    "the console commands: `set bus.commands bus` lets the bus",
-    "the bus commands: `stop` and `clear` work here, `set bus.commands console` takes over",
-    "the terminal strip commands: `stop` works here, `set bus.commands console` takes over",
-];
-
-impl Refusal {
-    /// Number of the refusal in the register of the bus, and its meaning there. A number keeps its meaning.
-    pub fn code(&self) -> u16 {
-        match self {
-            Self::Authority(_) => 1,
-            Self::MustBeOff => 2,
-            Self::NotConfirmed | Self::SavedOn { .. } => 3,
-            Self::NothingLearned | Self::Command(CommandError::Refused(Refused::NotLearned)) => 4,
-            Self::Command(CommandError::Refused(Refused::Fault(_))) => 5,
-            Self::Set(SetError::Loosens(..)) => 17,
-            Self::Set(_) | Self::Design(_) => 6,
-            Self::Hardware(_) => 7,
-            Self::Flash(_) => 8,
-            Self::Ended => 9,
-            Self::Command(CommandError::NoAnswer | CommandError::NotStarted(_)) => 10,
-            Self::Command(CommandError::Refused(_)) => 11,
-            Self::Held(_) => 13,
-            Self::Reference(_) => 14,
-            Self::Stopped => 15,
-            Self::TooOften(_) => 16,
-            _ => 12,
-        }
-    }
-}

@@ -1,7 +1,5 @@
 //! The reason why the last run ended, as words that survive a reset in RAM that is not cleared.
 
-use core::fmt;
-
 use crate::hash;
 
 /// Reasons to stop. The numbers continue those of the drive's faults; 70 to 73 and 76 belong to rejected settings (see `store/codec.rs`).
@@ -79,15 +77,6 @@ impl Record {
         }
         let (reason, _) = Reason::ALL.into_iter().find(|known| known.0 as u32 == reason)?;
         Some(Self { reason, details: [a, b, c, d] })
-    }
-}
-
-impl fmt::Display for Record {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let meaning =
-            Reason::ALL.iter().find(|known| known.0 == self.reason).map_or("", |known| known.1);
-        write!(f, "{} {meaning}", self.reason as u8)?;
-        self.details.iter().try_for_each(|word| write!(f, " {word:#x}"))
     }
 }
 

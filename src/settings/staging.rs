@@ -1,7 +1,5 @@
 //! Staged settings: changes that are collected, and put in force together.
 
-use core::fmt;
-
 use drive_core::learned::Learned;
 use drive_settings::entry::Change;
 use drive_settings::value::Value;
@@ -45,18 +43,12 @@ struct Staged {
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum SetError {
     /// The setting belongs to the board.
-    #[error("{} belongs to the board and is no setting of the console", .0.name())]
     Board(Key),
     /// A value out of range.
-    #[error("{0}")]
     Range(SettingsError),
     /// The first setting would loosen the second one, which is protective.
-    #[error("{} would loosen {}, a protective setting: set it at the console", .0.name(), .1.name())]
     Loosens(Key, Key),
 }
-
-/// A hardware setting has changed.
-pub const UNCONFIRMED: &str = "the board has to be confirmed again before a start";
 
 /// Remarks for the user on settings that have been put in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,28 +61,6 @@ pub struct Applied {
     pub protection: bool,
     /// The board is not confirmed with these values.
     pub unconfirmed: bool,
-}
-
-impl fmt::Display for Applied {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let notes = [
-            (self.timer, "dead time and switching frequency change at the next reset, if saved"),
-            (
-                self.protection,
-                "the limits hold in software; analog watchdogs and comparator follow from the next reset on, if saved",
-            ),
-            (self.unconfirmed, UNCONFIRMED),
-        ];
-        let mut separator = ": ";
-        for (_, note) in notes.into_iter().filter(|(so, _)| *so) {
-            write!(f, "{separator}{note}")?;
-            separator = "; ";
-        }
-        if let Some(name) = self.forgotten {
-            write!(f, "{separator}values learned with another {name} are dropped: learn again")?;
-        }
-        Ok(())
-    }
 }
 
 /// The protective settings.

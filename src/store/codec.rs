@@ -11,8 +11,6 @@
 //! is one, follows the keys as entries with ids of their own ([`learned`]). The version changes only with this layout. The checksum is
 //! the CRC-32 of Ethernet over everything but itself.
 
-use core::fmt;
-
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use drive_settings::entry::Change;
 
@@ -61,21 +59,6 @@ impl Rejected {
             Self::Value(_) => 72,
             Self::Refused => 73,
             Self::Board(_) => 76,
-        }
-    }
-}
-
-impl fmt::Display for Rejected {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} saved settings not used, defaults hold: ", self.code())?;
-        match self {
-            Self::Broken => f.write_str("no whole record"),
-            Self::Newer(version) => write!(f, "version {version}, known is {VERSION}"),
-            Self::Value(key) => write!(f, "unknown value of {key}"),
-            Self::Refused => f.write_str("out of range"),
-            Self::Board(name) => {
-                write!(f, "saved on the board {name}; the gates are not connected")
-            }
         }
     }
 }

@@ -62,12 +62,9 @@ pub fn newer(sequences: [Option<u32>; 2]) -> Option<(usize, u32)> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum FlashError {
     /// An erasure failed, with this status register.
-    #[error("the flash was not erased, status {0:#x}")]
     Erase(u32),
     /// Programming failed, with this status register.
-    #[error("the flash was not programmed, status {0:#x}")]
     Program(u32),
     /// This double word reads back differently than programmed.
-    #[error("double word {0} is read back differently")]
     Verify(usize),
 }

@@ -18,6 +18,7 @@ use induction_drive::chip::watchdog::{Guard, extended};
 use induction_drive::chip::{memory, over_voltage, pwm, start, stop, time};
 use induction_drive::commissioning::Session;
 use induction_drive::console::handle::Firmware;
+use induction_drive::console::words;
 use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::history::{History, Hours};
 use induction_drive::link::mailbox::{Receiver, Sender};
@@ -364,16 +365,7 @@ impl Firmware for Supervisor {
     }
 
     fn last_run(&self, to: &mut dyn fmt::Write) -> fmt::Result {
-        write!(to, "reset by {}", self.chip.cause)?;
-        if let Some(record) = &self.chip.record {
-            write!(to, ", {record}")?;
-        }
-        if let Some(why) = self.chip.not_started {
-            write!(to, "; not started: {why}")?;
-        }
-        match &self.chip.rejected {
-            Some(why) => write!(to, "; {why}"),
-            None => Ok(()),
-        }
+        let Chip { cause, record, not_started, rejected, .. } = &self.chip;
+        words::last_run(to, cause, record.as_ref(), *not_started, rejected.as_ref())
     }
 }
