@@ -5,6 +5,7 @@ use drive_core::{Command, Mode, Refused, Stop, TestReport};
 use drive_settings::Settings;
 
 use crate::recording::ring::Record as Period;
+use crate::rotor_tracking::Tracking;
 
 /// Event of a commissioning.
 // Exists once at a time.
@@ -125,6 +126,20 @@ impl Session {
         let found = self.commissioning.settings(settings);
         (found != *settings).then_some(found)
     }
+}
+
+/// Gives a period, if it is [observed](Period::observed), to the commissioning while it runs, and to the tracking otherwise. Returns the
+/// rotor time constant, s, that the tracking has found.
+pub fn observe(
+    session: &mut Session,
+    tracking: &mut Option<Tracking>,
+    seen: &Period,
+) -> Option<f32> {
+    if seen.observed && session.is_running() {
+        session.take(seen);
+        return None;
+    }
+    tracking.as_mut().filter(|_| seen.observed)?.take(seen)
 }
 
 #[cfg(test)]

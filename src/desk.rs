@@ -578,14 +578,12 @@ impl Desk {
     /// Lets the drive measure its motor.
     fn commission(&mut self, first: Step, last: Step, drive: &mut impl DriveHandle) -> Answer {
         self.not_held()?;
-        match drive.status().map(|status| status.state) {
-            None => Err(drive.no_control().into()),
-            Some(State::Fault(fault)) => Err(CommandError::Refused(Refused::Fault(fault)).into()),
-            Some(_) => {
-                drive.session().begin(first, last);
-                Ok(if last < Step::Inertia { Reply::Done } else { Reply::ShaftTurns })
-            }
+        let status = drive.status().ok_or_else(|| drive.no_control())?;
+        if let State::Fault(fault) = status.state {
+            return Err(CommandError::Refused(Refused::Fault(fault)).into());
         }
+        drive.session().begin(first, last);
+        Ok(if last < Step::Inertia { Reply::Done } else { Reply::ShaftTurns })
     }
 
     /// Puts the results of the commissioning in force, and saves them.
@@ -630,10 +628,8 @@ fn must_be_off(drive: &impl DriveHandle) -> Result<(), Refusal> {
 /// # Errors
 /// The reason why not.
 pub fn may_stage(drive: &impl DriveHandle) -> Result<(), Refusal> {
-    match drive.status() {
-        None => Err(drive.no_control().into()),
-        Some(_) => must_be_off(drive),
-    }
+    drive.status().ok_or_else(|| drive.no_control())?;
+    must_be_off(drive)
 }
 
 /// Designs the controllers for settings, and gives them to the drive. This function is the only place that does, because the coefficients

@@ -99,13 +99,6 @@ impl FirmwareSettings {
         }
     }
 
-    /// Drops the learned values, unless they hold for the settings `before` as well.
-    pub fn forget_unless_as(&mut self, before: &Self) {
-        if self.drive.learned_with_another(&before.drive).is_some() {
-            self.learned = None;
-        }
-    }
-
     /// Checks every value against its range and computes the coefficients of the drive.
     ///
     /// # Errors

@@ -142,11 +142,6 @@ impl Pin {
 
 impl core::fmt::Display for Pin {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let port = match self.port {
-            Port::A => 'A',
-            Port::B => 'B',
-            Port::C => 'C',
-        };
-        write!(f, "P{port}{}", self.number)
+        write!(f, "P{:?}{}", self.port, self.number)
     }
 }

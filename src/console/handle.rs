@@ -28,7 +28,7 @@ pub trait Firmware: DriveHandle {
     /// The next record for the stream.
     fn sampled(&mut self) -> Option<Record>;
     /// Sets how much is logged.
-    fn set_log_level(&mut self, level: Level);
+    fn set_log_level(&mut self, _: Level) {}
     /// Most bytes of the stack used so far, and its size.
     fn stack(&self) -> (usize, usize);
     /// Writes the version of the firmware.

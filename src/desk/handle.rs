@@ -30,7 +30,9 @@ pub trait DriveHandle {
     /// The drive refuses it, or does not answer.
     fn command(&mut self, command: Command) -> Result<Accepted, CommandError>;
     /// Reason why there is no control.
-    fn no_control(&self) -> CommandError;
+    fn no_control(&self) -> CommandError {
+        CommandError::NoAnswer
+    }
     /// The last report of the control interrupt; `None` if there was none.
     fn status(&self) -> Option<Status>;
     /// Whether the outputs are off and stay off until the next command.
@@ -47,9 +49,9 @@ pub trait DriveHandle {
     /// Notes that the drive has taken these settings.
     fn configured(&mut self, settings: &FirmwareSettings);
     /// Connects the pins of the gates, because the board is the one that the image is for.
-    fn connect(&mut self);
+    fn connect(&mut self) {}
     /// Notes that this protective setting has another value now. Only while the outputs are off.
-    fn changed(&mut self, key: Key);
+    fn changed(&mut self, _: Key) {}
     /// The commissioning.
     fn session(&mut self) -> &mut Session;
     /// Saves the settings. Takes up to two page erasures: only while the outputs are off.

@@ -75,18 +75,16 @@ impl Order {
         if from != Commander::Console {
             return !matches!(self, Self::Stop(_));
         }
-        matches!(
+        let moves = matches!(
             self,
-            Self::Start(_)
-                | Self::Learn { .. }
-                | Self::Commission(..)
-                | Self::Relock
+            Self::Relock
                 | Self::Torque(_)
                 | Self::Speed(_)
                 | Self::Jog(_)
                 | Self::Position(_)
                 | Self::Home(_)
-        )
+        );
+        self.starts() || moves
     }
 }
 

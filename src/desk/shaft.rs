@@ -9,24 +9,18 @@ use crate::settings::FirmwareSettings;
 /// Speed at and below which a braked shaft counts as at rest, mechanical rpm.
 const REST_RPM: f32 = 30.0;
 
-/// The speed of the shaft, see the head of the module.
+/// The speed of the shaft, see the head of the module. After a reset the shaft may be rotating, so its speed is not known.
+#[derive(Default)]
 pub struct Shaft {
     /// Electrical speed, turns per control period.
     freq: f32,
-    /// Whether the speed is not measured: it is the last measured one, or, after a reset, none.
-    assumed: bool,
+    /// Whether the speed is known. Otherwise it is the last measured one, or, after a reset, none.
+    known: bool,
     /// Whether the drive brakes, or stops after it has braked.
     braked: bool,
     measured_ms: u32,
     /// Periods and encoder count of the last report.
     counted: (u32, u32),
-}
-
-impl Default for Shaft {
-    fn default() -> Self {
-        // After a reset the shaft may be rotating.
-        Self { freq: 0.0, assumed: true, braked: false, measured_ms: 0, counted: (0, 0) }
-    }
 }
 
 impl Shaft {
@@ -45,16 +39,16 @@ impl Shaft {
                 if let Some(freq) = self.counted(status, settings) {
                     (self.freq, self.measured_ms) = (freq, now_ms);
                 }
-                return self.assumed = false;
+                return self.known = true;
             }
             State::Off if self.braked && rpm <= REST_RPM => {
-                return (self.freq, self.assumed) = (0.0, false);
+                return (self.freq, self.known) = (0.0, true);
             }
             State::Off | State::Fault(_) => {
                 let passed = now_ms.wrapping_sub(self.measured_ms) as f32 * 1e-3;
-                // Evaluated in each pass: a speed that is known once is not assumed again.
-                self.assumed &= passed < settings.command.coasts_s;
-                if !self.assumed {
+                // Evaluated in each pass: a speed that is known once stays known.
+                self.known |= passed >= settings.command.coasts_s;
+                if self.known {
                     self.freq = 0.0;
                 }
                 return;
@@ -65,7 +59,7 @@ impl Shaft {
         }
         (self.freq, self.measured_ms) = (status.telemetry.rotor_freq, now_ms);
         // The speed counts as assumed, should the drive go off now.
-        self.assumed = true;
+        self.known = false;
         self.counted = (status.periods, status.sample.encoder);
     }
 
@@ -93,6 +87,6 @@ impl Shaft {
 
     /// Whether the drive is off and does not know whether the shaft rotates.
     pub fn is_assumed(&self) -> bool {
-        self.assumed
+        !self.known
     }
 }

@@ -79,8 +79,7 @@ impl Staging {
 
     /// Takes the protection of the latest settings as the loosest that other sources than the console may set.
     fn bound(&mut self) {
-        let latest = self.staged.as_ref().map_or(&self.in_force, |staged| &staged.settings);
-        self.bounds = guarded().map(|key| key.level(latest)).collect();
+        self.bounds = guarded().map(|key| key.level(self.latest())).collect();
     }
 
     /// The settings in force.
@@ -207,8 +206,8 @@ impl Staging {
             return self.outdated.then_some(&mut self.in_force);
         };
         if !*learned {
-            settings.learned = self.in_force.learned;
-            settings.forget_unless_as(&self.in_force);
+            let holds = settings.drive.learned_with_another(&self.in_force.drive).is_none();
+            settings.learned = self.in_force.learned.filter(|_| holds);
         }
         Some(settings)
     }

@@ -16,7 +16,7 @@ use induction_drive::board;
 use induction_drive::chip::flash::Pages;
 use induction_drive::chip::watchdog::{Guard, extended};
 use induction_drive::chip::{memory, over_voltage, pwm, start, stop, time};
-use induction_drive::commissioning::Session;
+use induction_drive::commissioning::{self, Session};
 use induction_drive::console::handle::Firmware;
 use induction_drive::console::words;
 use induction_drive::desk::handle::{CommandError, DriveHandle};
@@ -169,14 +169,7 @@ impl Supervisor {
         while let Some(link) = &mut self.link {
             // Handled in place: copying each period would take most of the time.
             let tau_r = link.observed.take_with(|period| {
-                if !period.observed {
-                    return None;
-                }
-                if self.commissioning.is_running() {
-                    self.commissioning.take(period);
-                    return None;
-                }
-                self.tracking.as_mut()?.take(period)
+                commissioning::observe(self.commissioning, &mut self.tracking, period)
             });
             let Some(tau_r) = tau_r else { return };
             let Some(tau_r) = tau_r else { continue };
@@ -200,13 +193,9 @@ impl Supervisor {
             extended(&mut self.guard, || commissioning.design());
         });
         self.feed_watchdog();
-        if let Some(command) = command
-            && let Err(why) = self.command(command)
-        {
-            self.commissioning.refused(match why {
-                CommandError::Refused(refused) => Some(refused),
-                _ => None,
-            });
+        if let Some(Err(why)) = command.map(|command| self.command(command)) {
+            let why = if let CommandError::Refused(why) = why { Some(why) } else { None };
+            self.commissioning.refused(why);
         }
     }
 
@@ -326,9 +315,7 @@ impl Firmware for Supervisor {
     }
 
     fn cancel_trace(&mut self) {
-        if let Some(link) = &mut self.link {
-            link.trace.cancel();
-        }
+        self.link.iter_mut().for_each(|link| link.trace.cancel());
     }
 
     fn tracing(&self) -> bool {

@@ -11,17 +11,15 @@ use drive_core::{
 };
 use drive_settings::SettingsError;
 use induction_drive::board::TRACE_RECORDS;
-use induction_drive::commissioning::Session;
+use induction_drive::commissioning::{self, Session};
 use induction_drive::console::handle::Firmware;
 use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::history::History;
 use induction_drive::link::Status;
-use induction_drive::log::Level;
 use induction_drive::recording::ring::Record;
 use induction_drive::recording::trace::{self, Plan, Recorder, Sampled, Trace};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::settings::keys::Key;
 use induction_drive::store::FlashError;
 use motor_plant::Plant;
 
@@ -117,11 +115,7 @@ impl Machine {
             if streamed {
                 self.streamed.1.push_back(record);
             }
-            if observed && commissions {
-                self.session.take(&record);
-            } else if observed {
-                self.track(&record);
-            }
+            self.observe(&record);
         }
         if commissions
             && let Some(next) = self.session.poll(&self.drive.test_report(), Commissioning::design)
@@ -131,10 +125,10 @@ impl Machine {
         }
     }
 
-    fn track(&mut self, record: &Record) {
-        let Some(tracking) = &mut self.tracking else { return };
+    fn observe(&mut self, record: &Record) {
+        let tau_r = commissioning::observe(&mut self.session, &mut self.tracking, record);
         // The drive refuses the command if it has just stopped.
-        if let Some(tau_r) = tracking.take(record)
+        if let (Some(tau_r), Some(tracking)) = (tau_r, &mut self.tracking)
             && let Ok(accepted) = self.drive.command(&Command::RotorTimeConstant(tau_r))
         {
             tracking.taken(tau_r, accepted);
@@ -145,9 +139,6 @@ impl Machine {
 impl DriveHandle for Machine {
     fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
         self.drive.command(&command).map_err(CommandError::Refused)
-    }
-    fn no_control(&self) -> CommandError {
-        CommandError::NoAnswer
     }
     fn status(&self) -> Option<Status> {
         Some(Status {
@@ -174,8 +165,6 @@ impl DriveHandle for Machine {
         self.tracking = Tracking::new(&settings.drive);
         self.session.configured(&settings.drive);
     }
-    fn connect(&mut self) {}
-    fn changed(&mut self, _: Key) {}
     fn session(&mut self) -> &mut Session {
         &mut self.session
     }
@@ -216,7 +205,6 @@ impl Firmware for Machine {
     fn sampled(&mut self) -> Option<Record> {
         self.streamed.1.pop_front()
     }
-    fn set_log_level(&mut self, _: Level) {}
     fn stack(&self) -> (usize, usize) {
         (0, 0)
     }

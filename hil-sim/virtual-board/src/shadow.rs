@@ -13,8 +13,8 @@ use induction_drive::board::Timer;
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::{
-    commissioning::Session, desk::Desk, link::Status, recording::ring::Record, rotor_tracking::Tracking,
-    settings::Commander, settings::FirmwareSettings, settings::keys::Key, store::FlashError,
+    commissioning::Session, desk::Desk, link::Status, recording::ring::Record,
+    rotor_tracking::Tracking, settings::Commander, settings::FirmwareSettings, store::FlashError,
 };
 
 /// A drive with the settings of the board, and its own command arbiter.
@@ -49,9 +49,6 @@ impl DriveHandle for Orders {
         self.waiting.push_back(command);
         Ok(Accepted::AsGiven)
     }
-    fn no_control(&self) -> CommandError {
-        CommandError::NoAnswer
-    }
     fn status(&self) -> Option<Status> {
         Some(Status { periods: self.periods, state: self.state, ..Status::default() })
     }
@@ -62,8 +59,6 @@ impl DriveHandle for Orders {
         settings.build_for(&self.timer)
     }
     fn configured(&mut self, _: &FirmwareSettings) {}
-    fn connect(&mut self) {}
-    fn changed(&mut self, _: Key) {}
     fn session(&mut self) -> &mut Session {
         &mut self.session
     }
