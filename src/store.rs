@@ -18,18 +18,8 @@ pub use flash::{Flash, FlashError, SLOT_WORDS, SLOTS};
 
 use crate::settings::FirmwareSettings;
 
-/// Contents of the flash at start.
-#[derive(Clone, Copy, Debug, PartialEq)]
-// Exists once at a time.
-#[allow(clippy::large_enum_variant)]
-pub enum Loaded {
-    /// Nothing was ever saved.
-    Nothing,
-    /// The saved settings.
-    Settings(FirmwareSettings),
-    /// A record that cannot be used; it stays in the flash until the next save or longer.
-    Rejected(Rejected),
-}
+/// The saved settings, if any were saved. A record that cannot be used stays in the flash until the next save or longer.
+pub type Loaded = Result<Option<FirmwareSettings>, Rejected>;
 
 /// The saved settings: the flash, and the slot that the next `save` must not touch.
 #[derive(Debug)]
@@ -37,6 +27,8 @@ pub struct Saved<F> {
     flash: F,
     /// The slot with the valid set, and its sequence number.
     newest: Option<(usize, u32)>,
+    /// The slot of a set that was used: a save keeps its entries that this firmware does not know.
+    used: Option<usize>,
     /// The slot for the next set if none is valid.
     free: usize,
 }
@@ -49,13 +41,15 @@ impl<F: Flash> Saved<F> {
         let blank =
             [0, 1].map(|slot| (0..SLOT_WORDS).all(|word| flash.read(slot, word) == Some(ERASED)));
         let loaded = match newest {
-            Some((slot, _)) => codec::settings(&mut |word| flash.read(slot, word), defaults)
-                .map_or_else(Loaded::Rejected, Loaded::Settings),
-            None if blank == [true; SLOTS] => Loaded::Nothing,
-            None => Loaded::Rejected(Rejected::Broken),
+            Some((slot, _)) => {
+                codec::settings(&mut |word| flash.read(slot, word), defaults).map(Some)
+            }
+            None if blank == [true; SLOTS] => Ok(None),
+            None => Err(Rejected::Broken),
         };
         let free = usize::from(!blank[0] && blank[1]);
-        (Self { flash, newest, free }, loaded)
+        let used = newest.filter(|_| loaded.is_ok()).map(|(slot, _)| slot);
+        (Self { flash, newest, used, free }, loaded)
     }
 
     /// The flash, for the other data stored in it.
@@ -72,7 +66,10 @@ impl<F: Flash> Saved<F> {
             Some((newest, sequence)) => (1 - newest, sequence.wrapping_add(1)),
             None => (self.free, 0),
         };
-        let record = codec::record(settings, sequence);
+        let flash = &mut self.flash;
+        let others = self.used.map(|slot| codec::unknown(move |word| flash.read(slot, word)));
+        let mut record = [ERASED; SLOT_WORDS];
+        codec::write(&mut record, settings, sequence, others.into_iter().flatten());
         self.flash.erase(slot)?;
         // The double word that makes the record valid comes last.
         let others = (0..codec::length(&record)).filter(|word| *word != COMMIT);
@@ -80,7 +77,7 @@ impl<F: Flash> Saved<F> {
             let Some(value) = record.get(word) else { continue };
             self.flash.write(slot, word, *value)?;
         }
-        self.newest = Some((slot, sequence));
+        (self.newest, self.used) = (Some((slot, sequence)), Some(slot));
         Ok(())
     }
 }

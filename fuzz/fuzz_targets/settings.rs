@@ -3,7 +3,7 @@
 #![no_main]
 
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::store::{Flash, FlashError, Loaded, SLOT_WORDS, SLOTS, Saved, codec};
+use induction_drive::store::{Flash, FlashError, SLOT_WORDS, SLOTS, Saved, codec};
 use induction_drive_fuzz::doubles::found;
 use induction_drive_fuzz::{is_designed, sum};
 use libfuzzer_sys::fuzz_target;
@@ -50,7 +50,7 @@ fuzz_target!(|bytes: &[u8]| {
         }
     }
     let (mut saved, loaded) = Saved::load(&mut fake, &defaults);
-    if let Loaded::Settings(settings) = loaded
+    if let Ok(Some(settings)) = loaded
         && is_designed(bytes)
     {
         let _ = settings.build();
@@ -58,7 +58,7 @@ fuzz_target!(|bytes: &[u8]| {
     let mut other = defaults;
     other.drive.motor.r_s = 7.0;
     saved.save(&other).expect("nothing fails here");
-    assert_eq!(Saved::load(&mut fake, &defaults).1, Loaded::Settings(other));
+    assert_eq!(Saved::load(&mut fake, &defaults).1, Ok(Some(other)));
 });
 
 /// Settings, and a result that may have been learned with them.

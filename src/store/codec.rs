@@ -8,8 +8,9 @@
 //!
 //! The id of a key is its permanent number, in version 1 the hash of its name, so keys can be added, removed and renamed: a key that the
 //! record does not hold keeps its default, and an entry that belongs to no key is skipped. The result of a self-commissioning, if there
-//! is one, follows the keys as entries with ids of their own ([`learned`]). The version changes only with this layout. The checksum is
-//! the CRC-32 of Ethernet over everything but itself.
+//! is one, follows the keys as entries with ids of their own ([`learned`]). Behind them come the entries of the record before that belong
+//! to no key: an image without a module keeps the settings of the module. The version changes only with this layout. The checksum is the
+//! CRC-32 of Ethernet over everything but itself.
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use drive_settings::entry::Change;
@@ -23,7 +24,7 @@ use crate::settings::keys::{self, Key};
 
 /// The layout that is written.
 pub const VERSION: u16 = 2;
-/// Double words of the longest record that is written.
+/// Double words of the longest record of settings that are known.
 pub const WORDS: usize = FIRST + keys::COUNT + learned::WORDS;
 const _: () = assert!(WORDS <= SLOT_WORDS);
 /// The double word that is written last.
@@ -64,29 +65,49 @@ impl Rejected {
 }
 
 /// The record of `settings`; the double words after its [`length`] are erased.
-pub fn record(settings: &FirmwareSettings, sequence: u32) -> [u64; WORDS] {
-    let mut words = [ERASED; WORDS];
-    for (key, word) in keys::all().zip(words.iter_mut().skip(FIRST)) {
-        *word = pair(key.id().into(), key.to_bits(settings));
-    }
-    let mut entries = keys::COUNT;
-    if let Some(learned) = &settings.learned {
-        let values = learned::to_words(learned, settings.drive.scales.both_zero_vectors)
-            .into_iter()
-            .enumerate();
-        for ((index, value), word) in values.zip(words.iter_mut().skip(FIRST + entries)) {
-            *word = pair(learned::id(index), value);
-        }
-        entries += learned::WORDS;
-    }
-    words[0] = pair(MAGIC, u32::from(VERSION) | (entries as u32) << 16);
-    let written = words.iter().skip(FIRST).take(entries).copied();
-    words[COMMIT] = pair(sequence, checksum(words[0], sequence, written));
+pub fn record(settings: &FirmwareSettings, sequence: u32) -> [u64; SLOT_WORDS] {
+    let mut words = [ERASED; SLOT_WORDS];
+    write(&mut words, settings, sequence, core::iter::empty());
     words
 }
 
+/// Writes the record of `settings`, and of `others` as far as these fit, to erased words.
+pub fn write(
+    words: &mut [u64; SLOT_WORDS],
+    settings: &FirmwareSettings,
+    sequence: u32,
+    others: impl Iterator<Item = u64>,
+) {
+    let mut end = FIRST;
+    let mut put = |entry| {
+        if let Some(word) = words.get_mut(end) {
+            (*word, end) = (entry, end + 1);
+        }
+    };
+    keys::all().for_each(|key| put(pair(key.id().into(), key.to_bits(settings))));
+    if let Some(learned) = &settings.learned {
+        let values = learned::to_words(learned, settings.drive.scales.both_zero_vectors);
+        (0..).zip(values).for_each(|(index, value)| put(pair(learned::id(index), value)));
+    }
+    others.for_each(put);
+    words[0] = pair(MAGIC, u32::from(VERSION) | ((end - FIRST) as u32) << 16);
+    let written = words.iter().take(end).skip(FIRST).copied();
+    words[COMMIT] = pair(sequence, checksum(words[0], sequence, written));
+}
+
+/// The entries of a whole record that this firmware does not know: settings of a module that its image leaves out.
+pub fn unknown(mut read: impl FnMut(usize) -> Option<u64>) -> impl Iterator<Item = u64> {
+    // In other versions the ids are of another kind.
+    let head = read(0).and_then(header).filter(|(version, _)| *version == VERSION);
+    let words = FIRST..FIRST + head.map_or(0, |(_, entries)| entries);
+    words.filter_map(read).filter(|entry| {
+        let (id, _) = halves(*entry);
+        learned::index(id).is_none() && keys::all().all(|key| u32::from(key.id()) != id)
+    })
+}
+
 /// Double words of a record in use.
-pub fn length(record: &[u64; WORDS]) -> usize {
+pub fn length(record: &[u64; SLOT_WORDS]) -> usize {
     FIRST + header(record[0]).map_or(0, |(_, entries)| entries)
 }
 

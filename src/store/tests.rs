@@ -7,6 +7,7 @@ use proptest::prelude::*;
 
 use super::learned as learned_words;
 use super::*;
+use crate::boards;
 use crate::monitor::record::Reason;
 use crate::settings::keys;
 
@@ -76,7 +77,7 @@ fn save(fake: &mut Fake, settings: &FirmwareSettings) -> Result<(), FlashError> 
 
 #[test]
 fn an_erased_flash_holds_nothing() {
-    assert_eq!(load(&mut Fake::new()), Loaded::Nothing);
+    assert_eq!(load(&mut Fake::new()), Ok(None));
 }
 
 #[test]
@@ -87,7 +88,7 @@ fn what_is_saved_is_loaded_and_the_slots_take_turns() {
         let before = fake.words;
         save(&mut fake, &with_r_s(n as f32)).unwrap();
         erased.push([0, 1].map(|slot| fake.words[slot] != before[slot]));
-        assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(n as f32)));
+        assert_eq!(load(&mut fake), Ok(Some(with_r_s(n as f32))));
     }
     let turns = [[true, false], [false, true]];
     assert_eq!(erased, [turns, turns, turns].concat());
@@ -96,7 +97,7 @@ fn what_is_saved_is_loaded_and_the_slots_take_turns() {
     for n in 7..10 {
         saved.save(&with_r_s(n as f32)).unwrap();
     }
-    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(9.0)));
+    assert_eq!(load(&mut fake), Ok(Some(with_r_s(9.0))));
 }
 
 /// The record of firmware without learned values equals the present one, without these values.
@@ -111,12 +112,12 @@ fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by
     assert!(old[codec::length(&old)..].iter().all(|word| *word == u64::MAX));
     let mut fake = Fake::new();
     save(&mut fake, &with_r_s(7.0)).unwrap();
-    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
+    assert_eq!(load(&mut fake), Ok(Some(with_r_s(7.0))));
 
     let new = codec::record(&with_learned(), 0);
     assert_eq!(codec::length(&new), codec::WORDS);
     // No key has the number of a learned value, so firmware that does not know the learned values leaves them alone.
-    for word in &new[2 + keys::COUNT..] {
+    for word in &new[2 + keys::COUNT..codec::WORDS] {
         assert!(learned_words::index(*word as u32).is_some());
         assert!(keys::all().all(|key| u32::from(key.id()) != *word as u32));
     }
@@ -126,9 +127,9 @@ fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by
 fn what_was_learned_is_saved_and_loaded_with_its_settings_and_gone_with_the_defaults() {
     let mut fake = Fake::new();
     save(&mut fake, &with_learned()).unwrap();
-    assert_eq!(load(&mut fake), Loaded::Settings(with_learned()));
+    assert_eq!(load(&mut fake), Ok(Some(with_learned())));
     save(&mut fake, &board()).unwrap();
-    assert_eq!(load(&mut fake), Loaded::Settings(board()));
+    assert_eq!(load(&mut fake), Ok(Some(board())));
 }
 
 /// Half of a result, or one that no self-commissioning can give, is refused by name, with any settings.
@@ -142,7 +143,7 @@ fn what_cannot_have_been_learned_is_refused() {
         spoil(&mut record[first + 3 * n]);
         let mut fake = Fake::new();
         fake.hold(0, resealed(record));
-        assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Value("learned")), "{n}");
+        assert_eq!(load(&mut fake), Err(Rejected::Value("learned")), "{n}");
     }
 }
 
@@ -153,9 +154,9 @@ fn sequence_numbers_wrap() {
         let record = codec::record(&with_r_s(slot as f32 + 1.0), sequence);
         fake.hold(slot, record);
     }
-    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(2.0)));
+    assert_eq!(load(&mut fake), Ok(Some(with_r_s(2.0))));
     save(&mut fake, &with_r_s(3.0)).unwrap();
-    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
+    assert_eq!(load(&mut fake), Ok(Some(with_r_s(3.0))));
 }
 
 /// Power fails in every operation of a save, and again in every operation of the next one.
@@ -172,19 +173,19 @@ fn whenever_the_power_fails_the_old_or_the_new_set_is_there() {
             fake.left = Some(first);
             let done = save(&mut fake, &with_r_s(3.0)).is_ok();
             assert_eq!(done, first == operations);
-            let Loaded::Settings(now) = load(&mut fake) else { panic!("none left at {first}") };
+            let Ok(Some(now)) = load(&mut fake) else { panic!("none left at {first}") };
             let r_s = now.drive.motor.r_s;
             assert!(r_s == 3.0 || (r_s == 2.0 && !done), "{r_s} at {first}");
 
             let second = (first * 7 + seed as usize) % operations;
             fake.left = Some(second);
             assert!(save(&mut fake, &with_r_s(4.0)).is_err());
-            let Loaded::Settings(then) = load(&mut fake) else { panic!("{first}, then {second}") };
+            let Ok(Some(then)) = load(&mut fake) else { panic!("{first}, then {second}") };
             let next = then.drive.motor.r_s;
             assert!(next == r_s || next == 4.0, "{next} at {first}, then {second}");
             fake.left = None;
             save(&mut fake, &with_r_s(5.0)).unwrap();
-            assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(5.0)));
+            assert_eq!(load(&mut fake), Ok(Some(with_r_s(5.0))));
         }
     }
 }
@@ -195,7 +196,7 @@ fn a_failed_save_leaves_the_set_before_and_says_why() {
     save(&mut fake, &with_r_s(1.0)).unwrap();
     fake.left = Some(0);
     assert_eq!(save(&mut fake, &with_r_s(2.0)), Err(FlashError::Erase(0)));
-    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(1.0)));
+    assert_eq!(load(&mut fake), Ok(Some(with_r_s(1.0))));
 }
 
 #[test]
@@ -207,9 +208,9 @@ fn what_a_later_firmware_wrote_is_kept_until_the_save_after_next() {
     // The checksum is computed as by a later firmware.
     fake.hold(1, resealed(record));
     let kept = fake.words[1];
-    assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Newer(3)));
+    assert_eq!(load(&mut fake), Err(Rejected::Newer(3)));
     save(&mut fake, &with_r_s(3.0)).unwrap();
-    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
+    assert_eq!(load(&mut fake), Ok(Some(with_r_s(3.0))));
     assert_eq!(fake.words[1], kept);
 }
 
@@ -220,7 +221,57 @@ fn keys_may_come_and_go() {
     record[3] ^= 1 << 12;
     let mut fake = Fake::new();
     fake.hold(0, resealed(record));
-    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
+    assert_eq!(load(&mut fake), Ok(Some(with_r_s(7.0))));
+}
+
+/// A record with entries that this firmware does not know.
+fn record(
+    settings: &FirmwareSettings,
+    sequence: u32,
+    others: impl IntoIterator<Item = u64>,
+) -> [u64; SLOT_WORDS] {
+    let mut words = [ERASED; SLOT_WORDS];
+    codec::write(&mut words, settings, sequence, others.into_iter());
+    words
+}
+
+/// Settings of a module that an image leaves out outlast the saves of that image, together with the settings that it knows.
+#[test]
+fn a_save_keeps_the_settings_that_only_another_image_knows() {
+    let unknown = [60_000, 60_001].map(|id| 0x3f80_0000 << 32 | id);
+    let entries = |fake: &Fake, slot: usize| -> Vec<u64> {
+        codec::unknown(|at| fake.words[slot][at]).collect()
+    };
+    let mut fake = Fake::new();
+    fake.hold(0, record(&with_learned(), 3, unknown));
+    assert_eq!(load(&mut fake), Ok(Some(with_learned())));
+    for (slot, settings) in [(1, with_r_s(8.0)), (0, with_learned()), (1, board())] {
+        save(&mut fake, &settings).unwrap();
+        assert_eq!(load(&mut fake), Ok(Some(settings)));
+        assert_eq!(entries(&fake, slot), unknown);
+    }
+    // Those that do not fit are left out, and none of the known ones.
+    fake.hold(0, record(&with_learned(), 9, 60_000..60_500));
+    assert_eq!(load(&mut fake), Ok(Some(with_learned())));
+    assert_eq!(entries(&fake, 0).len(), SLOT_WORDS - codec::WORDS);
+}
+
+/// They belong to the board on which they were saved, and only this version of the layout has their ids.
+#[test]
+fn a_save_drops_what_was_saved_on_another_board_or_in_another_layout() {
+    let other = boards::ALL.iter().find(|other| **other != board().board).unwrap();
+    for settings in [FirmwareSettings::of(other), board()] {
+        let mut record = record(&settings, 3, [60_000]);
+        if settings.board == board().board {
+            record[0] += 1 << 32;
+        }
+        let mut fake = Fake::new();
+        fake.hold(0, resealed(record));
+        assert!(load(&mut fake).is_err());
+        save(&mut fake, &with_r_s(2.0)).unwrap();
+        assert_eq!(load(&mut fake), Ok(Some(with_r_s(2.0))));
+        assert_eq!(codec::unknown(|word| fake.words[1][word]).count(), 0);
+    }
 }
 
 #[test]
@@ -230,11 +281,11 @@ fn a_value_that_nobody_knows_is_named() {
     record[2 + place] ^= 1 << 40;
     let mut fake = Fake::new();
     fake.hold(0, resealed(record));
-    assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Value("angle_source")));
+    assert_eq!(load(&mut fake), Err(Rejected::Value("angle_source")));
 }
 
 /// The record with a corrected checksum.
-fn resealed(mut record: [u64; codec::WORDS]) -> [u64; codec::WORDS] {
+fn resealed(mut record: [u64; SLOT_WORDS]) -> [u64; SLOT_WORDS] {
     let mut bytes = record[0].to_le_bytes().to_vec();
     bytes.extend((record[1] as u32).to_le_bytes());
     bytes.extend(record[2..codec::length(&record)].iter().flat_map(|word| word.to_le_bytes()));
@@ -268,7 +319,7 @@ fn whenever_the_power_fails_what_was_learned_is_with_its_settings() {
             save(&mut fake, &before).unwrap();
             fake.left = Some(operation);
             assert!(save(&mut fake, &after).is_err());
-            let Loaded::Settings(now) = load(&mut fake) else { panic!("none at {operation}") };
+            let Ok(Some(now)) = load(&mut fake) else { panic!("none at {operation}") };
             assert!(now == before || now == after, "{now:?} at {operation}");
         }
     }
@@ -282,7 +333,7 @@ proptest! {
         let settings = FirmwareSettings { learned: Some(learned(random)), ..with_r_s(r_s) };
         let mut fake = Fake::new();
         save(&mut fake, &settings).unwrap();
-        prop_assert_eq!(load(&mut fake), Loaded::Settings(settings));
+        prop_assert_eq!(load(&mut fake), Ok(Some(settings)));
     }
 
     #[test]
@@ -305,9 +356,9 @@ proptest! {
         }
         let name = settings.board.name;
         let expected = if settings.board == board().board {
-            Loaded::Settings(settings)
+            Ok(Some(settings))
         } else {
-            Loaded::Rejected(Rejected::Board(name))
+            Err(Rejected::Board(name))
         };
         prop_assert_eq!(load(&mut fake), expected);
     }
@@ -323,9 +374,9 @@ proptest! {
         flip(&mut fake.words[1][word]);
         if both {
             flip(&mut fake.words[0][word]);
-            prop_assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Broken));
+            prop_assert_eq!(load(&mut fake), Err(Rejected::Broken));
         } else {
-            prop_assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(1.0)));
+            prop_assert_eq!(load(&mut fake), Ok(Some(with_r_s(1.0))));
         }
     }
 
@@ -345,9 +396,9 @@ proptest! {
                 fake.words[slot][0] = Some(record[0] & 0xffff_ffff_ffff | u64::from(entries) << 48);
             }
         }
-        prop_assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Broken));
+        prop_assert_eq!(load(&mut fake), Err(Rejected::Broken));
         save(&mut fake, &with_r_s(3.0)).unwrap();
-        prop_assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
+        prop_assert_eq!(load(&mut fake), Ok(Some(with_r_s(3.0))));
     }
 }
 

@@ -33,8 +33,8 @@ use induction_drive::monitor::watchdog::{FeedRule, Verdict, WINDOW_CYCLES};
 use induction_drive::recording::ring::Ring;
 use induction_drive::recording::trace::Trace;
 use induction_drive::settings::FirmwareSettings;
+use induction_drive::store::Saved;
 use induction_drive::store::codec::Rejected;
-use induction_drive::store::{Loaded, Saved};
 use induction_drive::terminals;
 
 /// The parts that the main loop works with.
@@ -186,9 +186,8 @@ fn load(pages: Pages, dual_bank: bool) -> Start {
     let (mut saved, loaded) = Saved::load(pages, &defaults);
     let hours = Hours::load(saved.flash(), dual_bank);
     let (mut settings, mut rejected) = match loaded {
-        Loaded::Settings(settings) => (settings, None),
-        Loaded::Rejected(why) => (defaults, Some(why)),
-        Loaded::Nothing => (defaults, None),
+        Ok(found) => (found.unwrap_or(defaults), None),
+        Err(why) => (defaults, Some(why)),
     };
     // The settings of the power stage are checked first; the others take longer.
     if settings.check().is_err() {

@@ -19,7 +19,7 @@ impl Fake {
     }
 
     /// A record is in this slot.
-    pub fn hold(&mut self, slot: usize, record: [u64; codec::WORDS]) {
+    pub fn hold(&mut self, slot: usize, record: [u64; SLOT_WORDS]) {
         for (word, value) in record.into_iter().enumerate() {
             self.words[slot][word] = Some(value);
         }

@@ -44,7 +44,7 @@ fn records_saved_by_commit_1abee12_are_read() {
         key.set(&mut expected, key.parse(value).unwrap());
     }
     assert!(expected.build().is_ok());
-    assert_eq!(load(&mut board_of_1abee12(defaults)), Loaded::Settings(expected));
+    assert_eq!(load(&mut board_of_1abee12(defaults)), Ok(Some(expected)));
 
     let changed = include_bytes!("changed-1abee12.bin");
     let mut expected = board();
@@ -55,7 +55,7 @@ fn records_saved_by_commit_1abee12_are_read() {
         key.set(&mut expected, key.parse(value).unwrap());
     }
     // That firmware learned with other rules, so its result is left out.
-    assert_eq!(load(&mut board_of_1abee12(changed)), Loaded::Settings(expected));
+    assert_eq!(load(&mut board_of_1abee12(changed)), Ok(Some(expected)));
 }
 
 /// Earlier firmware had other rules for d-axis current, current limit, table and dead time. The drive leaves out the values learned by
@@ -68,14 +68,14 @@ fn a_result_of_other_rules_is_left_out() {
         let mut record = codec::record(&new, 3);
         let mut fake = Fake::new();
         fake.hold(0, record);
-        assert_eq!(load(&mut fake), Loaded::Settings(new));
+        assert_eq!(load(&mut fake), Ok(Some(new)));
         // The bit that it did not write, and the last values.
         record[flags] &= !(1 << (32 + 24));
         record[codec::WORDS - lacks as usize..].fill(u64::MAX);
         record[0] -= lacks << 48;
         fake.hold(0, resealed(record));
         let expected = FirmwareSettings { learned: None, ..new };
-        assert_eq!(load(&mut fake), Loaded::Settings(expected), "{lacks}");
+        assert_eq!(load(&mut fake), Ok(Some(expected)), "{lacks}");
         let mut drive = Drive::new(expected.build().unwrap());
         let start = Command::Start(Mode::Torque);
         assert_eq!(drive.command(&start), Err(Refused::NotLearned));
@@ -88,6 +88,6 @@ fn a_result_of_other_rules_is_left_out() {
         record[flags] = record[flags - 1];
         record[0] -= 1 << 48;
         fake.hold(0, resealed(record));
-        assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Value("learned")), "{lacks}");
+        assert_eq!(load(&mut fake), Err(Rejected::Value("learned")), "{lacks}");
     }
 }

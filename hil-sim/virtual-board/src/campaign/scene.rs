@@ -8,7 +8,7 @@ use drive_settings::Settings;
 use hil_sim::config::{Value, assigned};
 use hil_sim::{Config, experiments::full_range::for_the_range, plant::Load};
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::store::{Flash, FlashError, Loaded, Saved};
+use induction_drive::store::{Flash, FlashError, Saved};
 use serde::Deserialize;
 
 use crate::board::{Board, Options};
@@ -241,7 +241,7 @@ pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
     );
     let mut chip = board.chip().clone();
     let defaults = FirmwareSettings::of(chip.gates.stage.board());
-    let Loaded::Settings(settings) = Saved::load(Bank(&mut chip), &defaults).1 else {
+    let Ok(Some(settings)) = Saved::load(Bank(&mut chip), &defaults).1 else {
         bail!("no whole settings in the flash");
     };
     Ok(settings)
