@@ -78,19 +78,19 @@ pub struct Timer {
     /// Dead time, s.
     pub dead_time_s: f32,
     /// Switching frequency.
-    pub carrier_khz: Carrier,
+    pub switching_khz: Carrier,
 }
 
 impl Timer {
     /// The timer values for these settings, which are within the ranges of the board.
     pub fn of(inverter: &Inverter) -> Self {
         let (dead_time_code, dead_time_s) = dead_time(inverter.dead_time_s);
-        Self { dead_time_code, dead_time_s, carrier_khz: inverter.carrier_khz }
+        Self { dead_time_code, dead_time_s, switching_khz: inverter.switching_khz }
     }
 
     /// The largest count.
     pub fn top(&self) -> u16 {
-        PWM_TOP / self.carrier_khz.pulses()
+        PWM_TOP / self.switching_khz.pulses()
     }
 
     /// Difference between the top with one pulse and this top, ticks. The control interrupt measures its start from the top with one
@@ -102,14 +102,14 @@ impl Timer {
     /// The RCR field: update events skipped. Update events occur at both ends of the count; one per control period is used, at the top
     /// (low sides on).
     pub fn updates_left_out(&self) -> u16 {
-        2 * self.carrier_khz.pulses() - 1
+        2 * self.switching_khz.pulses() - 1
     }
 
     /// The MMS field: the trigger output that starts the sampling of the currents. With one pulse the trigger is channel 4 at
     /// [`SAMPLE_AT`], so that the sampling ends at the top. Channel 4 triggers at every pulse, so with more pulses the update event
     /// starts the sampling, which then ends [`CURRENT_SAMPLING`] after the top.
     pub fn trigger_output(&self) -> u8 {
-        if self.carrier_khz == Carrier::Khz6 { 7 } else { 2 }
+        if self.switching_khz == Carrier::Khz6 { 7 } else { 2 }
     }
 }
 

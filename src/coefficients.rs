@@ -97,7 +97,7 @@ impl<'a> Designed<'a> {
         Ok(Self {
             version: VERSION,
             board: settings.board.name,
-            timer: (timer.dead_time_code, timer.dead_time_s, timer.carrier_khz.place() as u8),
+            timer: (timer.dead_time_code, timer.dead_time_s, timer.switching_khz.place() as u8),
             protection: board::protection(settings.board, &drive),
             rpm,
             pole_pairs: drive.motor.pole_pairs,
@@ -108,7 +108,7 @@ impl<'a> Designed<'a> {
     /// Values of the timer of the power stage.
     pub fn timer(&self) -> Timer {
         let (dead_time_code, dead_time_s, carrier) = self.timer;
-        Timer { dead_time_code, dead_time_s, carrier_khz: Carrier::at(carrier.into()) }
+        Timer { dead_time_code, dead_time_s, switching_khz: Carrier::at(carrier.into()) }
     }
 
     /// Returns the contents of a file; `None` if they do not fit.

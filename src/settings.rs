@@ -117,8 +117,8 @@ impl FirmwareSettings {
         self.check()?;
         // Changed in place and back, as the coefficients are, because copies would take 2 KiB more of the stack.
         let own = self.drive.inverter;
-        let &board::Timer { dead_time_s, carrier_khz, .. } = timer;
-        self.drive.inverter = Inverter { dead_time_s, carrier_khz, ..own };
+        let &board::Timer { dead_time_s, switching_khz, .. } = timer;
+        self.drive.inverter = Inverter { dead_time_s, switching_khz, ..own };
         let mut built = self.drive.build();
         self.drive.inverter = own;
         if let (Ok(coefficients), Some(learned)) = (&mut built, &self.learned) {
@@ -133,9 +133,9 @@ impl FirmwareSettings {
     /// The first value out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
         self.drive.check()?;
-        let carrier = self.drive.inverter.carrier_khz;
+        let carrier = self.drive.inverter.switching_khz;
         if carrier > self.board.carrier_max_khz {
-            return Err(SettingsError::Word("inverter.carrier_khz", carrier.word(), TOO_FAST));
+            return Err(SettingsError::Word("inverter.switching_khz", carrier.word(), TOO_FAST));
         }
         let commander = self.command.commander;
         if !crate::has(commander) {

@@ -79,7 +79,7 @@ fn the_right_wiring_of_every_motor_is_accepted() {
     for motor in Motor::all() {
         for khz in [6, 12, 18] {
             let changes =
-                ["inverter.dead_time_s=2.2e-6".to_owned(), format!("inverter.carrier_khz={khz}")];
+                ["inverter.dead_time_s=2.2e-6".to_owned(), format!("inverter.switching_khz={khz}")];
             let config = Config::load(Some(&motor.name), None, &changes).unwrap();
             let range = config.measurement.range_a;
             for seed in 0..12 {

@@ -110,8 +110,8 @@ const QUIET: [(&[&str], &str); 12] = [
     (&["measurement.heat_sink_c"], "without effect below the limit"),
     (
         &[
-            "injection.allowed_loss",
-            "injection.loss_s",
+            "injection.allowed_deficit",
+            "injection.deficit_s",
             "injection.tracked_rpm",
             "injection.check",
             "injection.monitor",

@@ -13,7 +13,7 @@ use hil_sim::{Config, Error};
 /// Returns the dissertation's motor with this switching frequency; every edge is simulated.
 fn config(carrier: Carrier) -> Config {
     let mut config = Config::default();
-    config.drive.inverter.carrier_khz = carrier;
+    config.drive.inverter.switching_khz = carrier;
     config.inverter.switched = true;
     config
 }

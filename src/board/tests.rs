@@ -69,15 +69,15 @@ fn the_numbers_are_those_of_the_design() {
 #[test]
 fn the_timer_makes_equal_pulses_in_a_control_period() {
     let tops = [(Carrier::Khz6, 14_167), (Carrier::Khz12, 7083), (Carrier::Khz18, 4722)];
-    for (carrier_khz, top) in tops {
+    for (switching_khz, top) in tops {
         let mut settings = settings();
-        settings.inverter.carrier_khz = carrier_khz;
+        settings.inverter.switching_khz = switching_khz;
         let timer = Timer::of(&settings.inverter);
         assert_eq!(timer.top(), top);
         assert_eq!(f32::from(top), settings.build().unwrap().front_end.top);
         // The timer leaves out this many ends of the count before an update; each pulse has two ends.
-        assert_eq!(timer.updates_left_out() + 1, 2 * carrier_khz.pulses());
-        let hz = CLOCK_HZ as f32 / (2 * u32::from(top) * u32::from(carrier_khz.pulses())) as f32;
+        assert_eq!(timer.updates_left_out() + 1, 2 * switching_khz.pulses());
+        let hz = CLOCK_HZ as f32 / (2 * u32::from(top) * u32::from(switching_khz.pulses())) as f32;
         assert!((hz / 6000.0 - 1.0).abs() < 1e-4, "{hz} Hz");
     }
 }

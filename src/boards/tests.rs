@@ -107,12 +107,12 @@ fn shunts_refuse_both_zero_vectors() {
 #[test]
 fn a_carrier_that_a_board_does_not_take_is_refused_by_name() {
     for board in ALL {
-        for (carrier_khz, word) in Carrier::VALUES.iter().zip(Carrier::WORDS) {
+        for (switching_khz, word) in Carrier::VALUES.iter().zip(Carrier::WORDS) {
             let mut settings = FirmwareSettings::of(board);
-            settings.drive.inverter.carrier_khz = *carrier_khz;
-            let shunts = board.currents.shunts.is_some() && *carrier_khz != Carrier::Khz6;
+            settings.drive.inverter.switching_khz = *switching_khz;
+            let shunts = board.currents.shunts.is_some() && *switching_khz != Carrier::Khz6;
             let why = shunts.then(|| {
-                format!("inverter.carrier_khz = {word}: shunts below the low sides settle too slowly for shorter pulses; set it to 6")
+                format!("inverter.switching_khz = {word}: shunts below the low sides settle too slowly for shorter pulses; set it to 6")
             });
             assert_eq!(settings.check().err().map(|why| why.to_string()), why, "{}", board.name);
         }
@@ -120,9 +120,9 @@ fn a_carrier_that_a_board_does_not_take_is_refused_by_name() {
     let slow: &'static Board =
         Box::leak(Box::new(Board { carrier_max_khz: Carrier::Khz12, ..*ALL[0] }));
     let mut settings = FirmwareSettings::of(slow);
-    settings.drive.inverter.carrier_khz = Carrier::Khz18;
+    settings.drive.inverter.switching_khz = Carrier::Khz18;
     let why =
-        "inverter.carrier_khz = 18: the switches of the board do not take it; set a lower one";
+        "inverter.switching_khz = 18: the switches of the board do not take it; set a lower one";
     assert_eq!(settings.check().unwrap_err().to_string(), why);
 }
 

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use drive_settings::entry::{Change, Entry, Guard};
+use drive_settings::renamed::old_name;
 use drive_settings::value::{Value, ValueError};
 use drive_settings::{SETTINGS, Settings, SettingsError};
 
@@ -38,9 +39,9 @@ fn at(place: usize) -> Option<Key> {
     SETTINGS.get(place).map(Key::Drive).or_else(own)
 }
 
-/// The setting with this name.
+/// The setting with this name, or with this old name.
 pub fn find(name: &str) -> Option<Key> {
-    all().find(|key| key.name() == name)
+    all().find(|key| [key.name(), old_name(key.name())].contains(&name))
 }
 
 /// The setting with this [permanent number](Key::id).

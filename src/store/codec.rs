@@ -14,6 +14,7 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use drive_settings::entry::Change;
+use drive_settings::renamed::old_name;
 
 use super::flash::{ERASED, SLOT_WORDS, halves, pair};
 use super::learned;
@@ -160,7 +161,7 @@ pub fn settings(
     for word in FIRST..FIRST + entries {
         let (id, bits) = halves(read(word).ok_or(Rejected::Broken)?);
         let is_it = |key: &Key| match version {
-            ..=1 => hash::of(key.name().bytes()) == id,
+            ..=1 => hash::of(old_name(key.name()).bytes()) == id,
             _ => u32::from(key.id()) == id,
         };
         match keys::all().find(is_it) {

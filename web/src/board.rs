@@ -86,7 +86,7 @@ pub fn plant_settings(settings: &FirmwareSettings) -> PlantSettings {
         mechanics: MechanicsSettings { load: Load::Locked, ..MechanicsSettings::DEFAULT },
         inverter: InverterSettings {
             timer_top: board::PWM_TOP,
-            pulses: settings.drive.inverter.carrier_khz.pulses(),
+            pulses: settings.drive.inverter.switching_khz.pulses(),
             dead_time_us: f64::from(dead_time_s) * 1e6,
             ..InverterSettings::DEFAULT
         },
@@ -185,7 +185,7 @@ impl HostBoard {
         self.now_ms = self.now_ms.wrapping_add(1);
         if self.machine.resets {
             let (mut plant, saved) = (self.machine.plant.clone(), self.machine.saved);
-            plant.set_pulses(saved.drive.inverter.carrier_khz.pulses());
+            plant.set_pulses(saved.drive.inverter.switching_khz.pulses());
             // The saved settings were in force, so a board can be built with them.
             if let Ok(board) = Self::on(plant, &saved) {
                 *self = Self { contacts: self.contacts, ..board };

@@ -235,9 +235,9 @@ fn the_mean_of_both_zero_vectors_is_half_the_sum_and_a_quarter_of_a_period_older
 /// upper one is that of the last pulse.
 #[test]
 fn the_share_of_the_dead_time_grows_with_the_carrier() {
-    let of = |carrier_khz| {
+    let of = |switching_khz| {
         let mut settings = Settings::default();
-        settings.inverter.carrier_khz = carrier_khz;
+        settings.inverter.switching_khz = switching_khz;
         let lag = settings.build().unwrap().current_lag;
         settings.scales.both_zero_vectors = true;
         let built = settings.build().unwrap();
@@ -247,19 +247,20 @@ fn the_share_of_the_dead_time_grows_with_the_carrier() {
         let lost = built.dead_time.voltage(signs, 311.0, 0.0).a;
         (lost, built.modulator.circle(311.0), plain, built.current_lag - lag)
     };
-    for (carrier_khz, times) in [(Carrier::Khz6, 1.0), (Carrier::Khz12, 2.0), (Carrier::Khz18, 3.0)]
+    for (switching_khz, times) in
+        [(Carrier::Khz6, 1.0), (Carrier::Khz12, 2.0), (Carrier::Khz18, 3.0)]
     {
-        let (lost, circle, plain, older) = of(carrier_khz);
-        assert!((lost - times * 4.105).abs() < 0.01, "{carrier_khz:?}: {lost} V");
-        assert!((older - 0.25 / times).abs() < 1e-6, "{carrier_khz:?}: {older} periods");
+        let (lost, circle, plain, older) = of(switching_khz);
+        assert!((lost - times * 4.105).abs() < 0.01, "{switching_khz:?}: {lost} V");
+        assert!((older - 0.25 / times).abs() < 1e-6, "{switching_khz:?}: {older} periods");
         let circle = circle * 1.732_050_8 / 311.0;
-        assert!((circle - (1.0 - times * 0.0264)).abs() < 1e-4, "{carrier_khz:?}: {circle}");
+        assert!((circle - (1.0 - times * 0.0264)).abs() < 1e-4, "{switching_khz:?}: {circle}");
         // The shortest pulse is 3.2 us, a duty of 1.92 % at 6 kHz.
         let shortest = times * 3.2e-6 * 6000.0;
         for (duty, wanted) in [(0.99 * shortest, shortest), (0.49 * shortest, 0.0)] {
             let along = AlphaBeta::new((1.0 - 2.0 * duty) * 311.0 * 2.0 / 3.0, 0.0);
             let made = plain.step(along, Abc::ZERO, 311.0).duties[1];
-            assert!((made - wanted).abs() < 1e-4, "{carrier_khz:?}: {duty} {made}");
+            assert!((made - wanted).abs() < 1e-4, "{switching_khz:?}: {duty} {made}");
         }
     }
 }

@@ -237,7 +237,7 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
             good.angle_source = AngleSource::Injection;
             // This load has no saliency and no back-EMF.
             good.injection.synchronous.check = false;
-            good.sequence.catch = false;
+            good.sequence.flying_start = false;
         }
         let (mut drive, mut load) = (Drive::new(good.build().unwrap()), Load::new());
         drive.command(&Command::Start(Mode::Torque)).unwrap();
@@ -411,10 +411,10 @@ fn settings_out_of_range_are_refused_by_name() {
         ),
         (|s| s.sequence.i_d = Some(9.0), "sequence.i_d = 9"),
         (
-            |s| s.injection.synchronous.allowed_loss = 2.0,
-            "injection.allowed_loss = 2: allowed is 0.3 to 0.9",
+            |s| s.injection.synchronous.allowed_deficit = 2.0,
+            "injection.allowed_deficit = 2: allowed is 0.3 to 0.9",
         ),
-        (|s| s.injection.synchronous.loss_s = f32::NAN, "injection.loss_s = NaN"),
+        (|s| s.injection.synchronous.deficit_s = f32::NAN, "injection.deficit_s = NaN"),
         (
             |s| {
                 *s = sensorless();

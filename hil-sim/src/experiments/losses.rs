@@ -1,4 +1,4 @@
-//! Copper loss of the motor against the minimum for its torque, with and without `flux.economy`.
+//! Copper loss of the motor against the minimum for its torque, with and without `flux.minimise_loss`.
 
 use super::battery::held;
 use super::full_range::for_the_range;
@@ -25,7 +25,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut table = Table::new("Copper loss", &[]);
     let mut config = for_the_range(context.config)?;
     for economy in [false, true] {
-        config.drive.flux.economy = economy;
+        config.drive.flux.minimise_loss = economy;
         let (drive, limit) = learned_limit(&config, context.seed)?;
         let points = SHARES.map(|share| (share * limit.nm, share * limit.i_q));
         let measured = context.in_parallel("losses", &points, |number, &point| {

@@ -102,8 +102,9 @@ impl Shadow {
     /// Returns its settings, with the dead time and the switching frequency of the timer.
     pub fn settings(&self) -> Settings {
         let mut settings = self.firmware_settings().drive;
-        let Timer { dead_time_s, carrier_khz, .. } = self.orders.timer;
-        (settings.inverter.dead_time_s, settings.inverter.carrier_khz) = (dead_time_s, carrier_khz);
+        let Timer { dead_time_s, switching_khz, .. } = self.orders.timer;
+        (settings.inverter.dead_time_s, settings.inverter.switching_khz) =
+            (dead_time_s, switching_khz);
         settings
     }
 

@@ -50,26 +50,26 @@ fn a_drive_that_was_configured_at_the_console_is_the_same() -> Result<()> {
 /// within 5 %, and the compare values are those of the host. This also holds with the currents of both zero vectors.
 #[test]
 fn a_drive_with_a_quiet_carrier_is_the_same() -> Result<()> {
-    for (carrier_khz, seed) in [(Carrier::Khz12, 13), (Carrier::Khz18, 14)] {
+    for (switching_khz, seed) in [(Carrier::Khz12, 13), (Carrier::Khz18, 14)] {
         let mut config = Config::default();
-        config.drive.inverter.carrier_khz = carrier_khz;
+        config.drive.inverter.switching_khz = switching_khz;
         let mut pair = Pair::new(Image::built()?, Options::new(&config, seed).set_up(&config)?)?;
-        assert_eq!(pair.shadow.settings().inverter.carrier_khz, carrier_khz);
+        assert_eq!(pair.shadow.settings().inverter.switching_khz, switching_khz);
         for both in ["no", "yes"] {
             pair.order(&format!("set scales.both_zero_vectors {both}"))?;
             pair.order("apply")?;
-            with_pulses(&mut pair, carrier_khz)?;
+            with_pulses(&mut pair, switching_khz)?;
         }
         assert!(pair.shadow.compared > 48_000, "{}", pair.shadow.compared);
     }
     Ok(())
 }
 
-fn with_pulses(pair: &mut Pair, carrier_khz: Carrier) -> Result<()> {
+fn with_pulses(pair: &mut Pair, switching_khz: Carrier) -> Result<()> {
     pair.start_torque()?;
     let pulse = u64::from(pair.board.chip().tim1.period());
-    let period = pulse * u64::from(carrier_khz.pulses());
-    assert_eq!(period, 28_332, "{carrier_khz:?}");
+    let period = pulse * u64::from(switching_khz.pulses());
+    assert_eq!(period, 28_332, "{switching_khz:?}");
     let settings = pair.shadow.settings();
     let per_ampere = f64::from(settings.motor.torque_per_ampere(settings.i_d()));
     for i_q in [1.5, -1.0] {
@@ -82,8 +82,8 @@ fn with_pulses(pair: &mut Pair, carrier_khz: Carrier) -> Result<()> {
             assert!(since == 0 || since.abs_diff(period) < 200, "{since} ticks");
         })?;
         let wanted = per_ampere * i_q;
-        println!("{carrier_khz:?}: {sum:.4} of {wanted:.4} Nm");
-        assert!((sum / wanted - 1.0).abs() < 0.05, "{carrier_khz:?}: {sum} of {wanted} Nm");
+        println!("{switching_khz:?}: {sum:.4} of {wanted:.4} Nm");
+        assert!((sum / wanted - 1.0).abs() < 0.05, "{switching_khz:?}: {sum} of {wanted} Nm");
     }
     compare_telemetry(pair)?;
     pair.order("stop")?;

@@ -25,7 +25,7 @@ fn records_saved_by_commit_1abee12_are_read() {
         ("injection.full_reference_iq_a", "1"),
         ("injection.current_saliency", "0.0338"),
         ("injection.tracked_rpm", "700"),
-        ("injection.loss_s", "0.08"),
+        ("injection.deficit_s", "0.08"),
         ("limits.current_a", "3.5"),
         ("motor.inertia", "0.012"),
         ("limits.trip_a", "4.3"),

@@ -118,7 +118,7 @@ impl Settings {
                 dc_link: s.dc_link,
                 full_scale: s.full_scale.saturating_mul(1 + u16::from(s.both_zero_vectors)),
                 heat_sink: s.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
-                top: f32::from(self.inverter.top / self.inverter.carrier_khz.pulses()),
+                top: f32::from(self.inverter.top / self.inverter.switching_khz.pulses()),
             },
             offsets: OffsetCheck {
                 samples: periods(self.sequence.calibrate_s) as u16,
@@ -169,7 +169,7 @@ impl Settings {
             unlearned: tracks && !t.allow_unlearned,
             prediction: Prediction::new(m, motor_plant, allowed_v, allowed_mean_v),
             flying_start: self.flying_start([d.k_c, q.k_c]),
-            voltage_limit: if self.flux.economy { limit.economical(m) } else { limit },
+            voltage_limit: if self.flux.minimise_loss { limit.economical(m) } else { limit },
             dc_link: DcLink::new(&self.dc_link_limits()),
             power: self.power_limit(),
             motion: self.motion(&motion_design),
@@ -215,8 +215,8 @@ impl Settings {
         let settings = LockMonitorSettings {
             slope: self.slope(),
             moved_a: self.share_of_rated(MOVED_A),
-            smoothing_s: t.loss_s,
-            allowed: t.allowed_loss,
+            smoothing_s: t.deficit_s,
+            allowed: t.allowed_deficit,
             carrier_a,
         };
         LockMonitor::new(&self.carrier(), &settings)

@@ -89,7 +89,7 @@ settings! {
         /// The control runs at 6 kHz, with a whole number of equal pulses in each control period. The share of the dead time, the shortest
         /// pulse and the switching losses grow with the switching frequency. Every board has a largest one. Shunts below the low sides are
         /// sampled at 6 kHz only.
-        carrier_khz: Carrier = Carrier::Khz6, 130: word().changed(Change::FromReset).learned();
+        switching_khz: Carrier = Carrier::Khz6, 130: word().changed(Change::FromReset).learned();
     }
 
     /// Scales of the ADCs and of the encoder. Defaults: Eq. 3.5; 0.11 V per ADC count (451 V at full scale); the 5305 Hz
@@ -336,9 +336,9 @@ settings! {
         /// allowed saliency deficit, a share
         ///
         /// 1 means zero flux.
-        allowed_loss: f32 = 0.55, 58: number().from_to(0.3, 0.9).guarded(Guard::Lower);
+        allowed_deficit: f32 = 0.55, 58: number().from_to(0.3, 0.9).guarded(Guard::Lower);
         /// time constant of the mean of the saliency deficit
-        loss_s: f32 = 0.12, 59: number("s").from_to(0.01, 1.0).guarded(Guard::Lower);
+        deficit_s: f32 = 0.12, 59: number("s").from_to(0.01, 1.0).guarded(Guard::Lower);
         /// speed that trips without an encoder
         ///
         /// It is mechanical: the end of the range in which the angle is tracked.
@@ -443,7 +443,7 @@ settings! {
         /// whether a start first looks for a rotating shaft (flying start)
         ///
         /// The search takes 0.25 s and is done without an encoder only.
-        catch: bool = Catch::IN_BUILD.is_some(), 83: word();
+        flying_start: bool = Catch::IN_BUILD.is_some(), 83: word();
     }
 
     /// The choice of the flux; see `drive_core::current::voltage_limit`.
@@ -452,7 +452,7 @@ settings! {
         ///
         /// The flux is between half and all of the flux of `sequence.i_d`. A q-axis current then gives less torque, and a torque step for
         /// which the present flux is too small takes a rotor time constant.
-        economy: bool = false, 84: word();
+        minimise_loss: bool = false, 84: word();
     }
 
     /// The speed loop, and the position loop around it. Unset values follow [`rules`](super::rules).

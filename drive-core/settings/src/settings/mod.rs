@@ -11,6 +11,7 @@ mod list;
 mod motor_sensor;
 mod ntc;
 mod numbers;
+pub mod renamed;
 pub mod rules;
 #[cfg(feature = "serde")]
 mod stored;
@@ -62,7 +63,7 @@ impl Carrier {
 impl Inverter {
     /// Returns the switching period, s.
     pub fn carrier_s(&self) -> f32 {
-        PERIOD_S / f32::from(self.carrier_khz.pulses())
+        PERIOD_S / f32::from(self.switching_khz.pulses())
     }
 }
 
@@ -151,8 +152,8 @@ impl Settings {
         if self.scales.both_zero_vectors && self.scales.sensors == CurrentSensors::LowSide {
             return Err(SettingsError::Word("scales.both_zero_vectors", true.word(), BLIND));
         }
-        if self.sequence.catch && Catch::IN_BUILD.is_none() {
-            return Err(SettingsError::Word("sequence.catch", true.word(), LEFT_OUT));
+        if self.sequence.flying_start && Catch::IN_BUILD.is_none() {
+            return Err(SettingsError::Word("sequence.flying_start", true.word(), LEFT_OUT));
         }
         if self.limits_power() && Power::IN_BUILD.is_none() {
             return Err(SettingsError::Word(
@@ -161,9 +162,9 @@ impl Settings {
                 LEFT_OUT,
             ));
         }
-        let carrier = self.inverter.carrier_khz;
+        let carrier = self.inverter.switching_khz;
         if carrier != Carrier::Khz6 && self.scales.sensors == CurrentSensors::LowSide {
-            return Err(SettingsError::Word("inverter.carrier_khz", carrier.word(), SLOW));
+            return Err(SettingsError::Word("inverter.switching_khz", carrier.word(), SLOW));
         }
         let kind = self.injection.demodulator;
         let present = has_all || kind == DemodulatorKind::Synchronous;

@@ -295,7 +295,7 @@ fn without_a_sensor_it_trips_beyond_the_speed_that_is_tracked() {
 #[test]
 fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
     let mut settings = motor_settings(AngleSource::Injection);
-    (settings.observer.enabled, settings.sequence.catch) = (true, true);
+    (settings.observer.enabled, settings.sequence.flying_start) = (true, true);
     let mut refused = 0;
     for (rpm, wrong_by, caught) in [
         (180.0, 0.0, true),

@@ -41,7 +41,7 @@ fn row(trust: &Trust) -> String {
 #[test]
 fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
     let mut settings = Settings::default();
-    (settings.observer.enabled, settings.sequence.catch) = (true, true);
+    (settings.observer.enabled, settings.sequence.flying_start) = (true, true);
     let c = settings.build().unwrap();
     let alone = c.flying_start.unwrap().injection_only;
     let fixed = Try { _built: BUILT, from: Origin::Fixed, freq: 0.0, steps: 0 };

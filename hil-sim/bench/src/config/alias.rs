@@ -1,5 +1,7 @@
 //! Old names of keys, which stay accepted.
 
+use drive_settings::renamed::RENAMED;
+
 use super::{DRIVE, Value};
 
 /// Old names, the current names, and the conversion to the current value.
@@ -26,7 +28,10 @@ pub fn today(name: &str, value: &Value) -> (String, Value) {
     let (prefix, bare) = name.split_at(if of_drive { DRIVE.len() } else { 0 });
     match ALIASES.iter().find(|(old, ..)| *old == bare) {
         Some((_, today, of)) => (format!("{prefix}{today}"), of(value)),
-        None => (name.to_owned(), value.clone()),
+        None => {
+            let now = RENAMED.iter().find(|(_, old)| *old == bare).map_or(bare, |(now, _)| now);
+            (format!("{prefix}{now}"), value.clone())
+        }
     }
 }
 

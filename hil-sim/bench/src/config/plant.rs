@@ -45,7 +45,7 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
     plant.saliency.psi_n = Some(config.saliency.psi_n.unwrap_or(config.amperes(0.7) * m.l_m));
     plant.inverter.residual_v = 1.64 * relative_voltage;
     plant.inverter.dead_time_us = i.dead_time_s * 1e6;
-    plant.inverter.pulses = config.drive.inverter.carrier_khz.pulses();
+    plant.inverter.pulses = config.drive.inverter.switching_khz.pulses();
     plant.inverter.extra_dead_time_us = i.extra_dead_time_s * 1e6;
     plant.measurement.noise_a *= relative_range;
     plant.measurement.lsb_a *= relative_range;

@@ -35,7 +35,8 @@ impl Settings {
         let rated_hz = self.nameplate.frequency_hz;
         let search_current = SEARCH_SHARE * current;
         let path = Path::new(&self.motor, 0.5 * (k_c[0] + k_c[1]));
-        let built = Catch::IN_BUILD.filter(|_| self.uses_observer() && self.sequence.catch)?;
+        let built =
+            Catch::IN_BUILD.filter(|_| self.uses_observer() && self.sequence.flying_start)?;
         Some(FlyingStart {
             built,
             search_current,
