@@ -255,9 +255,10 @@ impl Frame {
 }
 
 /// Phase of the flux.
-// See `Phase`.
+// See `Phase`. With its tag in a byte of a part, the compiler would copy all of it at each change.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, Default)]
+#[repr(u32)]
 enum FluxPhase {
     /// Search of a flying start. The frame is fixed, and no check is active.
     Search(CatchState),
@@ -419,8 +420,14 @@ impl<L: AngleLoop> Drive<L> {
         Self { c: coefficients, changes: 0, kept, phase }
     }
 
-    /// Returns the present state.
-    pub fn state(&self) -> State {
+    /// Returns the present state, for what runs from the flash.
+    #[cold]
+    fn present_state(&self) -> State {
+        self.state_now()
+    }
+
+    #[inline(always)] // into `state` of the compiled drives; generic, each crate would have a copy of its own
+    fn state_now(&self) -> State {
         match &self.phase {
             Phase::Off(_) => State::Off,
             Phase::Fault(fault, _) => State::Fault(*fault),
@@ -607,6 +614,12 @@ macro_rules! compiled_here {
             /// outputs off in the same step.
             pub fn step(&mut self, measured: &Measured) -> Output {
                 self.run_step(measured, &mut |_| {})
+            }
+
+            /// Returns the present state.
+            #[inline(never)]
+            pub fn state(&self) -> State {
+                self.state_now()
             }
 
             /// Executes a command. Call it between two steps, not from within [`step`](Self::step).

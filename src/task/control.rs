@@ -52,10 +52,11 @@ const _: () = assert!(size_of::<Drive<FilterLoop>>() <= 4096);
 
 /// Control periods since the start, wrapping.
 pub static PERIODS: AtomicU32 = AtomicU32::new(0);
-/// Whether the drive is off or in fault: the outputs are off, and stay off until the next command.
-pub static IS_OFF: AtomicBool = AtomicBool::new(true);
-/// Whether the drive is stopping with the outputs on.
-pub static IS_STOPPING: AtomicBool = AtomicBool::new(false);
+/// Stage of the drive: [`OFF`] if it is off or in fault, where the outputs stay off until the next command, [`STOPPING`] if it stops with
+/// the outputs on, else 0.
+pub static STAGE: AtomicU8 = AtomicU8::new(OFF);
+pub const OFF: u8 = 1;
+pub const STOPPING: u8 = 2;
 /// Whether the commissioning observes the drive while it regulates.
 pub static RECORD_FOR_MAIN: AtomicBool = AtomicBool::new(false);
 /// Control periods from one record of the stream to the next; 0: none.
@@ -186,9 +187,7 @@ impl Running {
         let (_, output) = drive.period(&mut self.front_end, &sample, put_out);
 
         let (latency, missed) = stage.end(&period, was_off, &output);
-        if latency > self.worst_latency {
-            self.worst_latency = latency;
-        }
+        self.worst_latency = self.worst_latency.max(latency);
         if missed {
             MISSED.store(true, Ordering::Relaxed);
         }
@@ -218,9 +217,10 @@ impl Running {
             stage.pwm.trip();
             stage.pwm.disarm();
         }
-        IS_OFF.store(is_off, Ordering::Relaxed);
         let state = drive.state();
-        IS_STOPPING.store(state.is_stopping(), Ordering::Relaxed);
+        // Both are never true.
+        let told = OFF * u8::from(is_off) + STOPPING * u8::from(state.is_stopping());
+        STAGE.store(told, Ordering::Relaxed);
         let sampled = Sampled::new(&sample, state, drive.limiting());
         let traced = trace.step(&sampled, drive.telemetry());
 

@@ -247,11 +247,11 @@ impl DriveHandle for Supervisor {
     }
 
     fn is_off(&self) -> bool {
-        control::IS_OFF.load(Ordering::Relaxed)
+        control::STAGE.load(Ordering::Relaxed) == control::OFF
     }
 
     fn is_stopping(&self) -> bool {
-        control::IS_STOPPING.load(Ordering::Relaxed)
+        control::STAGE.load(Ordering::Relaxed) == control::STOPPING
     }
 
     fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {

@@ -19,7 +19,7 @@ impl<L: AngleLoop> Drive<L> {
     /// # Errors
     /// See [`Drive::command`].
     pub fn execute(&mut self, command: &Command<L>) -> Result<Accepted, Refused> {
-        allowed(command, self.state(), self.mode())?;
+        allowed(command, self.state_now(), self.mode())?;
         match *command {
             Command::Start(mode) => {
                 return self.start(Start::of_mode(mode).ok_or(Refused::NotBuilt)?);

@@ -137,7 +137,7 @@ impl<L: AngleLoop> Drive<L> {
             _ => Default::default(),
         };
         TestReport {
-            state: self.state(),
+            state: self.present_state(),
             starts: self.kept.starts,
             offsets: [self.kept.offsets[0], self.kept.offsets[1]],
             trains,

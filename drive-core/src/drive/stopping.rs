@@ -48,7 +48,7 @@ impl<L: AngleLoop> Drive<L> {
                 }
                 field.enter(k, FluxPhase::ready());
             }
-            _ => return Err(Refused::State(self.state())),
+            _ => return Err(Refused::State(self.present_state())),
         }
         Ok(Accepted::AsGiven)
     }
