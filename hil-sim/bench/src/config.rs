@@ -33,6 +33,11 @@ use motors::Motor;
 /// Prefix of the keys that set the drive alone.
 const DRIVE: &str = "drive.";
 
+/// Returns the settings of the dissertation's drive, which knows the inertia of its simulated motor.
+fn dissertation() -> Settings {
+    Settings { inertia: Some(MotorConfig::default().inertia as f32), ..Settings::default() }
+}
+
 impl Config {
     /// Returns the defaults, changed first by the motor, then by the file, and then by the assignments `KEY=VALUE`, in order.
     ///
@@ -119,8 +124,8 @@ impl Config {
     /// acceleration. The result is not a larger share of the torque at the current limit either.
     pub fn newton_metres(&self, on_reference: f64) -> f64 {
         let torque = self.relative(|s| s.motor.torque_per_ampere(s.i_d()) * s.current_limit_a());
-        let inertia = |of: &Settings| f64::from(of.inertia() / f32::from(of.motor.pole_pairs));
-        on_reference * torque.min(inertia(&self.drive) / inertia(&Self::default().drive))
+        let inertia = self.relative(|s| s.inertia() / f32::from(s.motor.pole_pairs));
+        on_reference * torque.min(inertia)
     }
 
     /// Rated torque, Nm: power over speed of the nameplate.
@@ -130,7 +135,7 @@ impl Config {
 
     /// A quantity of the drive's settings, divided by its value in the dissertation's drive.
     fn relative(&self, of: fn(&Settings) -> f32) -> f64 {
-        f64::from(of(&self.drive)) / f64::from(of(&Settings::default()))
+        f64::from(of(&self.drive)) / f64::from(of(&dissertation()))
     }
 
     /// The mechanical speed, rpm, that has the same electrical frequency as `on_reference`, rpm, on four poles.

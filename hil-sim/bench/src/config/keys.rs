@@ -79,8 +79,7 @@ macro_rules! keys {
 
         impl Default for Config {
             fn default() -> Self {
-                let mut config = Self { $($group: $type::default(),)+ drive: Settings::default(), after: BTreeMap::new() };
-                config.drive.inertia = Some(config.motor.inertia as f32);
+                let mut config = Self { $($group: $type::default(),)+ drive: super::dissertation(), after: BTreeMap::new() };
                 // The saliency of the simulated motor is known, and so are its tables at 0.7 A.
                 config.drive.injection.synchronous.allow_unlearned = true;
                 config.calibrate();
