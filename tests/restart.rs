@@ -7,6 +7,8 @@ use hil_sim::Config;
 use hil_sim::config::motors::Motor;
 use hil_sim::plant::Load;
 use hil_sim::rig::Rig;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::SplitMix64;
 
 /// Share of the rated speed below which a shaft counts as standing.
 const STANDS: f64 = 0.05;
@@ -41,15 +43,9 @@ struct Draw {
 
 impl Draw {
     fn new(number: u32, seed: u32) -> Self {
-        let mut state =
-            (u64::from(seed) << 32 | u64::from(number)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        // splitmix64
-        let mut next = || {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut mixed = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((mixed ^ mixed >> 31) >> 11) as f64 / (1_u64 << 53) as f64
-        };
+        let state = (u64::from(seed) << 32 | u64::from(number)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mut random = SplitMix64::from_seed(state.to_le_bytes());
+        let mut next = || random.random::<f64>();
         let share = 0.1 + 0.9 * next();
         Self {
             share: if next() < 0.5 { -share } else { share },
