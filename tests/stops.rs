@@ -94,7 +94,7 @@ fn an_s_ramp_rounds_speed_and_stop() {
 }
 
 /// A start at any moment of a stop turns it round, in each mode: the drive regulates at once, the torque never exceeds that of the stop or
-/// of the usual ramp, and the shaft reaches the new reference without turning back on its way.
+/// of the usual ramp, and the speed goes straight from its value in the stop to the new reference.
 #[test]
 fn a_start_turns_a_stop_round_in_each_mode() {
     const MOMENTS: usize = 100;

@@ -1,9 +1,9 @@
 //! The small image: it runs one motor at one speed, and logs. No console, no bus, no settings, no design on the chip.
 //!
-//! The coefficients of the drive come from a file that `cargo sim coefficients` writes and a debug probe puts into the flash. The button
-//! of the Nucleo board starts the motor, and stops it by the ramp. Read it from top to bottom: [`image::main`] sets the chip up,
-//! [`image::Control::period`] is the control interrupt, [`image::run`] is the main loop. Everything else is the control crate
-//! (`Drive::period`) and the drivers of the chip (`src/chip`).
+//! The coefficients of the drive come from a file that `cargo sim coefficients` writes and a debug probe puts into the flash. If you press
+//! the button of the Nucleo board, the motor starts; press it again, and the drive stops by the ramp. Read this file from top to bottom:
+//! [`image::main`] sets the chip up, [`image::Control::period`] is the control interrupt, [`image::run`] is the main loop. Everything else
+//! is the control crate (`Drive::period`) and the drivers of the chip (`src/chip`).
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
