@@ -146,6 +146,16 @@ fn a_rotating_shaft_is_found_at_any_speed() {
     }
 }
 
+/// After a power-up nothing is known of a shaft that rotates. A fixed frame with the whole current would reverse the lightest ones.
+#[test]
+fn a_light_shaft_is_not_reversed_after_a_power_up() {
+    for (motor, plant) in [("buildings-4kw", "r"), ("kart-5kw3", "g7")] {
+        let draws = (0..10).map(|n| Draw { power_up: true, ..Draw::new(n, 3) });
+        let Restarts { faults, wrong, braked, .. } = restarts(motor, plant, draws).unwrap();
+        assert_eq!((faults, wrong, braked), (0, 0, 0), "{motor} {plant}");
+    }
+}
+
 /// Prints the results of 200 restarts of each motor of the list on three kinds of iron.
 #[test]
 #[ignore = "takes ten minutes: the table of a review"]

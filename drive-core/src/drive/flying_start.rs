@@ -111,31 +111,33 @@ impl<L: AngleLoop> Coefficients<L> {
             return Ok(Dq::ZERO);
         };
         let (at, turns) = (search.at, search.at.freq != 0.0);
+        let brief = at.from == Origin::Brief && !turns;
         let drives = s.carried.residual.is_some_and(|flux| flux.volts > NEGLIGIBLE_EMF_V);
+        let current = if turns || brief { start.search_current } else { start.current };
         if n == 0 {
             if !drives {
-                let current = if turns { start.search_current } else { start.current };
                 s.reference[0] = ReferenceState::at_rest(INITIAL_SHARE * current);
             }
             s.estimator.preset_speed(at.freq);
         }
         let d = match (turns, drives) {
+            (_, false) => current,
             // In the frame that rotates with it, a residual flux shows its speed without current.
             (true, true) => 0.0,
-            // A larger one would brake the shaft, or add to the current of a residual flux.
-            (true, false) | (false, true) => start.search_current,
-            (false, false) => start.current,
+            // A larger one would add to the current of the residual flux.
+            (false, true) => start.search_current,
         };
         let wanted = Dq { d, q: 0.0 };
         if n > catch::FROM && !turns {
             self.current_loop.freeze_integrator(&mut s.current_loop);
         }
-        let end = start.search[usize::from(turns)];
+        let end = if brief { catch::BRIEF } else { start.search[usize::from(turns)] };
         if turns {
             search.settle(n, end, s.observer.change, k.seen.current);
         }
         let flux = match search.step(n, end, s.observer.change) {
             SearchResult::Searching => return Ok(wanted),
+            SearchResult::Standing if brief => return self.search_on(s, k).map(|()| wanted),
             SearchResult::Standing if !turns => {
                 s.carried.residual = None;
                 s.hand_over = HandOver::default();
@@ -156,7 +158,8 @@ impl<L: AngleLoop> Coefficients<L> {
             (true, false) => (at.freq - slip, slip.abs() < start.near),
         };
         // A frame in the other sense than the rotor shows a slow one. So a slow rotor of unknown speed is left to the fixed frame.
-        let least = if at.from == Origin::Run { ROTATES } else { LEAST_SHARE * HIGHEST };
+        let known = matches!(at.from, Origin::Run | Origin::Brief);
+        let least = if known { ROTATES } else { LEAST_SHARE * HIGHEST };
         let (ahead, most) = (if at.freq < 0.0 { -rotor } else { rotor }, at.freq.abs());
         let established = if turns { start.injection_only } else { 0 };
         if turns {
@@ -169,7 +172,13 @@ impl<L: AngleLoop> Coefficients<L> {
                 return Ok(wanted);
             }
         }
-        if !is_found || (turns && ahead < least) {
+        if brief && is_found && (ROTATES..self.protection.rotor_freq).contains(&rotor.abs()) {
+            // The frame that rotates with the shaft hardly brakes it.
+            s.carried.residual = None;
+            self.search_in(s, k, Try { freq: rotor, ..at });
+            return Ok(wanted);
+        }
+        if brief || !is_found || (turns && ahead < least) {
             return self.search_on(s, k).map(|()| wanted);
         }
         let flux = search.flux();
@@ -192,6 +201,7 @@ impl<L: AngleLoop> Coefficients<L> {
         let (from, freq) = match s.carried.rotor_freq {
             Some(freq) if freq.abs() > ROTATES => (Origin::Run, freq),
             None if fastest > 0.0 => (Origin::Forward, fastest),
+            None => (Origin::Brief, 0.0),
             _ => (Origin::Fixed, 0.0),
         };
         s.flux = FluxPhase::Search(CatchState::new(Try { _built: built, from, freq, steps: 0 }));
@@ -222,7 +232,8 @@ impl<L: AngleLoop> Coefficients<L> {
         let (from, freq) = match last.from {
             Origin::Run if fastest > 0.0 => (Origin::Forward, fastest),
             Origin::Forward => (Origin::Backward, -fastest),
-            Origin::Run | Origin::Backward => (Origin::Fixed, 0.0),
+            Origin::Run | Origin::Backward => (Origin::Brief, 0.0),
+            Origin::Brief => (Origin::Fixed, 0.0),
             Origin::Fixed => return Err(Fault::NotCaught),
         };
         self.estimator.start(&mut s.estimator);

@@ -43,6 +43,9 @@ const LONG: (usize, f32) = (48, 0.7);
 const KEPT: usize = 3 * LONG.0 + 1;
 /// Control periods until the current has settled: 20 ms.
 pub const FROM: u32 = 120;
+/// Control periods of the brief search: 80 ms. In simulation 700 power-ups run in the sense of the shaft with it. With 60 ms, noise at rest looks
+/// like rotation more often.
+pub const BRIEF: u32 = 480;
 /// Highest frequency that the short lag can measure, frequency above which the short lag alone is used, and lowest frequency that
 /// counts as rotating, electrical turns per period.
 const HIGHEST: f32 = 151.0 * PERIOD_S;
@@ -157,6 +160,9 @@ pub enum Origin {
     /// The highest speed, in either sense.
     Forward,
     Backward,
+    /// The frame is fixed, for a short time and with a small current, which brakes a light shaft but little. Then the frame rotates with the
+    /// speed found.
+    Brief,
     /// The frame is fixed.
     Fixed,
 }
