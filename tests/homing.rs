@@ -55,7 +55,7 @@ fn turns(rig: &mut Rig) -> f64 {
 
 /// Position 0 is where the stop yields to the torque, and positions count from there. A heavy shaft swings at its elastic stop for longer
 /// than the wait: 0.0315 turns at most in 96 runs. Without an encoder the position drifts under torque: 0.0139 turns at most in 192 runs,
-/// and 0.0255 one turn away.
+/// and one turn away 0.0302 in 390 runs, where 90 % are within 0.0134.
 #[test]
 fn the_stop_becomes_position_0() {
     let heavier = ["motor.inertia=0.06", "drive.motor.inertia=0.06"];
@@ -78,7 +78,7 @@ fn the_stop_becomes_position_0() {
             let there = turns(&mut rig) - stop + f64::from(rpm.signum());
             assert!(wrong.abs() < accuracy, "{wrong}");
             // The position without an encoder drifts by about 3 degrees during the motion.
-            assert!(there.abs() < accuracy + 0.013, "{there}");
+            assert!(there.abs() < accuracy + 0.018, "{there}");
         }
     }
 }
