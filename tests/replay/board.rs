@@ -42,8 +42,6 @@ fn replay(name: &str) -> (Vec<u64>, usize) {
     let mut settings = FirmwareSettings::of_the_board();
     // The recorded board had not learned.
     settings.drive.injection.synchronous.allow_unlearned = true;
-    // This was the default of its image.
-    settings.drive.inertia = Some(0.012);
     let drive = Drive::new(settings.build().unwrap());
     let mut hashes: Vec<Fnv> = Vec::new();
     play(drive, &settings, &samples, &orders, 1, |n, compare, _, _| {
@@ -58,22 +56,22 @@ fn replay(name: &str) -> (Vec<u64>, usize) {
 #[test]
 fn torque_steps_without_a_sensor() {
     let (hashes, interrupts) = replay("sensorless");
-    assert_eq!(interrupts, 66_874);
+    assert_eq!(interrupts, 67_354);
     assert_eq!(
         hashes,
         [
-            0x4f46_c34d_2340_65e2,
-            0x20c5_e0ff_87bf_2860,
-            0xdf92_5fe2_44d7_c960,
-            0x7275_b66f_0179_de2a,
-            0x7799_55cd_bbc2_6548,
-            0x1be9_6b0b_f82e_3705,
-            0xe251_32b4_49c5_033d,
-            0x716e_837a_b654_4ac1,
-            0xd932_6a55_9404_4911,
-            0x62c5_fd1d_db4f_b771,
-            0xdd22_4e6c_a5a9_b71e,
-            0x78c9_f22f_d839_01b3
+            0x128c_baa6_9661_3d13,
+            0x8f22_f58a_13ca_5094,
+            0x2138_a104_9dac_dd36,
+            0x5496_8d66_6c83_afee,
+            0x830b_b57a_fe3b_5a01,
+            0x2bb2_5af6_ee39_cf4a,
+            0xd153_b866_e01e_0890,
+            0x08fc_80bc_c159_f12a,
+            0xdd97_bf64_3c2c_5423,
+            0xcc41_28d1_a952_4940,
+            0x8239_789c_4f63_8a18,
+            0x8e10_5a4a_e064_f188
         ],
         "{hashes:#018x?}"
     );
@@ -82,15 +80,15 @@ fn torque_steps_without_a_sensor() {
 #[test]
 fn position_steps_with_the_encoder() {
     let (hashes, interrupts) = replay("encoder");
-    assert_eq!(interrupts, 27_451);
+    assert_eq!(interrupts, 27_559);
     assert_eq!(
         hashes,
         [
             0xbca7_8fe8_cd36_3465,
-            0x6a73_ee64_474e_c22b,
-            0x71be_f114_e87a_8563,
-            0xe65b_d80d_cb4c_1a31,
-            0xaead_2632_cdbb_233d
+            0xc4c8_5991_1bfe_262c,
+            0xd2e7_e9bb_20ed_5561,
+            0x5be8_828c_63bc_dbc3,
+            0xab8a_fdce_4c18_bff9
         ],
         "{hashes:#018x?}"
     );
