@@ -1253,6 +1253,8 @@ def quotes():
             f"The factor {constant(ESTIMATOR, 'AVERAGED_NOISE'):.2f} (`AVERAGED_NOISE`) is {constant(ESTIMATOR, 'AVERAGED_NOISE') / WHITE:.2f} times the "
             f"{WHITE:.3f} that (N4) gives for the mean direction, and {constant(ESTIMATOR, 'AVERAGED_NOISE') / (period * math.sqrt(2)):.2f} times the "
             f"{period * math.sqrt(2):.3f} of the worst direction",
+            f"is {cell(direction(0), 2)}, {cell(direction(60), 2)} and {cell(direction(150), 2)} σ². At 2.5 A the prediction is "
+            + ", ".join(f"{zero_frequency(chi):.1f}°" for chi in (0, 60)) + f" and {zero_frequency(150):.1f}°",
             f"s_0 = {constant(OBSERVER, 'GAIN_AT_STANDSTILL'):.0f}, c = {constant(OBSERVER, 'GAIN_PER_SPEED')}",
             f"({math.sqrt(Filter(1.0, 0.0).r1) * DEG:.1f}°)²",
             f"({math.sqrt(Filter(1.0, 0.0).r2):.1f} rad/s)²",
@@ -1277,6 +1279,17 @@ def quotes():
             f"{100 * M.sigma * M.tau * 50e-6 * 375**2 / 2:.1f} % at 375 rad/s and 50 µs",
         ],
     }
+
+
+def direction(degrees):
+    """Variance of the noise in a direction, relative to that of a sensor, Eq. N2."""
+    c, s = math.cos(degrees / DEG), math.sin(degrees / DEG)
+    return c * c + 5 / 3 * s * s + 2 / math.sqrt(3) * s * c
+
+
+def zero_frequency(degrees):
+    """Noise of the angle, degrees, at 2.5 A and zero stator frequency, with the flux in this direction."""
+    return Filter(2.5, -2.5 / (I_D * M.tau)).noise_deg() * math.sqrt(direction(degrees) / SENSORS)
 
 
 def margins_of_the_table():
