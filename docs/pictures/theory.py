@@ -724,15 +724,18 @@ def picture_q():
     v.curve(fixed, GREEN, "6 4", 1.8)
     v.curve(fast, ORANGE)
     v.curve(settled, BLUE, width=2.6)
+    for k, left, right in [(slope(q_fast, i_q), -45, 20), (slope(q_slow, i_q), -42, 52)]:
+        v.curve([(e, ref + k * e / DEG) for e in (left, right)], INK, "2 3", 1.6)
+    v.text(-38, 0.163, f"k_fast = {label(slope(q_fast, i_q), 3)} /rad")
+    v.text(89, -0.033, f"k = {label(slope(q_slow, i_q), 3)} /rad", anchor="end")
     v.dot(0, ref)
     for zero in zeros(lambda e: q_fast(I_D, i_q, e) - ref, -1.5, -0.3):
         v.dot(zero * DEG, ref, ORANGE, hollow=True)
     v.dot(low, ref, BLUE, hollow=True)
     for zero in zeros(lambda e: restoring(i_q, e), 0.8, 1.57):
         v.dot(zero * DEG, ref, BLUE, hollow=True)
-    v.text(-57, 0.155, "fast: flux and current", ORANGE)
-    v.text(-57, 0.155, "stay in the stator", ORANGE, dy=17)
-    v.text(89, -0.036, "lasting, flux settled", BLUE, "end")
+    v.text(-88, 0.137, "fast error", ORANGE)
+    v.text(89, -0.057, "lasting, flux settled", BLUE, "end")
     v.text(89, 0.06, "lasting, flux not yet settled", GREEN, "end")
     v.text(low, 0.03, "flux gone", BLUE, "end", dx=-2, dy=10)
     return p
