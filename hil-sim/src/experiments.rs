@@ -4,6 +4,7 @@
 mod anti_windup;
 pub mod battery;
 pub mod commission;
+pub mod course;
 mod current_step;
 pub mod drawn_machine;
 mod foreign_motors;

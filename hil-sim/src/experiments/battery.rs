@@ -15,10 +15,8 @@ mod trial;
 
 use std::sync::OnceLock;
 
-pub(super) use bench::{Bench, LONGEST_START_S, Moment};
+pub use bench::{Bench, LONGEST_START_S, Moment};
 pub use kind::{KINDS, Kind, allowed_a, nominal_limit_a, torque_limit_a, torque_nm};
-pub(super) use kind::{LoadTorque, Part, Shaft};
-pub(super) use run::{bring_up, follow, held};
 pub use run::{learned, trial};
 pub use summary::Summary;
 pub use trial::{Refused, Trial};

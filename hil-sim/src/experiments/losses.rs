@@ -1,6 +1,6 @@
 //! Copper loss of the motor against the minimum for its torque, with and without `flux.minimise_loss`.
 
-use super::battery::held;
+use super::battery::Bench;
 use super::full_range::for_the_range;
 use super::torque_limit::learned_limit;
 use crate::plant::MachineSettings;
@@ -64,18 +64,16 @@ fn measure(
     (nm, mut i_q): (f64, f64),
     seed: u64,
 ) -> Result<[f64; 3], Error> {
-    let lost = || Error::Refused(format!("the drive did not regulate {nm:.2} Nm"));
-    let on = |regulates: bool| regulates.then_some(()).ok_or_else(lost);
-    let mut bench = held(config, drive, RPM, seed)?.ok_or_else(lost)?;
+    let mut bench = Bench::held(config, drive, RPM, seed)?;
     for _ in 0..CORRECTIONS {
-        bench.torque(i_q as f32)?;
-        on(bench.watch(CORRECTED_S))?;
+        bench.command_torque(i_q)?;
+        bench.watch(CORRECTED_S);
         // The torque is proportional to the current or to its square.
         i_q *= (nm / bench.rig.plant.torque()).sqrt();
     }
     let mut mean = [0.0; 3];
     for _ in 0..SAMPLES {
-        on(bench.watch(SAMPLE_S))?;
+        bench.watch(SAMPLE_S);
         let (plant, machine) = (&bench.rig.plant, plant_settings(config).machine);
         let (psi, i) = (plant.rotor_flux(), plant.current());
         let rotor = (psi - i * machine.lm) / (machine.lm + machine.llr);
@@ -83,5 +81,6 @@ fn measure(
         let now = [psi.norm() / machine.lm, plant.torque(), loss];
         mean.iter_mut().zip(now).for_each(|(mean, now)| *mean += now / f64::from(SAMPLES));
     }
-    Ok(mean)
+    let lost = || Error::Refused(format!("the drive did not regulate {nm:.2} Nm"));
+    if bench.has_ended { Err(lost()) } else { Ok(mean) }
 }

@@ -1,6 +1,6 @@
 //! The largest torque over speed and dc-link voltage, motoring and generating, as the drive gives it.
 
-use super::battery::held;
+use super::battery::Bench;
 use super::full_range::{I_D_A, for_the_range};
 use super::torque_limit::{BEYOND_A, TorqueLimit, learned_limit};
 use crate::prelude::*;
@@ -47,13 +47,13 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 /// Mean torque, Nm, in the commanded direction, and largest phase current, A.
 fn measure(config: &Config, drive: &Drive, point: Point, seed: u64) -> Result<Measured, Error> {
-    let Some(mut bench) = held(config, drive, point.rpm, seed)? else { return Ok(None) };
+    let mut bench = Bench::held(config, drive, point.rpm, seed)?;
     let volts = config.inverter.dc_link_v * point.link;
     bench.rig.plant.set_dc_link(volts).map_err(Error::refused)?;
-    bench.torque((point.sign * config.amperes(BEYOND_A)) as f32)?;
-    bench.counted_from = Some(bench.time() + SETTLING_S);
-    let still = bench.watch(SETTLING_S + MEAN_S);
-    Ok(still.then(|| (point.sign * bench.torque.mean(), bench.trial.peak_a)))
+    bench.command_torque(point.sign * config.amperes(BEYOND_A))?;
+    bench.count_after(SETTLING_S);
+    bench.watch(SETTLING_S + MEAN_S);
+    Ok((!bench.has_ended).then(|| (point.sign * bench.torque.mean(), bench.trial.peak_a)))
 }
 
 fn outcome(config: &Config, limit: &TorqueLimit, measured: &[(Point, Measured)]) -> Outcome {

@@ -1,7 +1,8 @@
-//! A drive and a plant in a run of the stress test, with the quantities that are observed.
+//! A drive and a plant in a run, with the quantities that are observed.
 
-use super::kind::{nominal_limit_a, torque_nm};
+use super::kind::{nominal_limit_a, share_of_limit, torque_nm};
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
+use crate::experiments::course::{Change, Part, Shaft};
 use crate::plant::{Complex, Plant};
 use crate::prelude::*;
 
@@ -14,6 +15,10 @@ const GAP_S: f64 = 0.1;
 
 /// Longest start, s.
 pub const LONGEST_START_S: f64 = 30.0;
+/// Step time and acceleration of the dynamometer that brings a shaft up to speed, s and rpm/s, and the time after it, s.
+const PACE_S: f64 = 0.01;
+const RAMP_RPM_PER_S: f64 = 600.0;
+const AT_SPEED_S: f64 = 0.3;
 /// Number of periods between two recorded moments: 5 ms.
 const TRACE_EVERY: u64 = 30;
 
@@ -56,17 +61,24 @@ pub struct Moment {
 }
 
 /// A drive and a plant, with the quantities that are observed.
-pub struct Bench {
+pub struct Bench<'a> {
     /// Drive and plant.
     pub rig: Rig,
+    /// Configuration of the plant, which scales currents, speeds and torques.
+    pub config: &'a Config,
+    shaft: Shaft,
+    /// Quantity that the drive regulates.
+    mode: Mode,
     /// Flux of the magnetising current, Wb.
     nominal_flux: f64,
     /// Time from which the error is counted, s; unset before the first reference, and after the flux was rotated.
-    pub counted_from: Option<f64>,
+    counted_from: Option<f64>,
     /// Torque of the motor over the same time, Nm.
     pub torque: Stats,
     /// The run so far.
     pub trial: Trial,
+    /// The last reference as the drive accepted it, A or rpm.
+    pub taken: f64,
     /// Angle error at the last sample, degrees.
     pub error_deg: f64,
     /// Error beyond which the angle is wrong, degrees.
@@ -81,27 +93,36 @@ pub struct Bench {
     is_off: bool,
     /// Whether the flux was rotated.
     turned: bool,
-    /// Quantity that the drive regulates since the last [`Bench::start`].
-    pub mode: Mode,
+    /// Whether the drive did not start, or no longer regulates.
+    pub has_ended: bool,
 }
 
-impl Bench {
-    /// Copies a drive that is off, and the plant with another load.
+impl<'a> Bench<'a> {
+    /// Copies a drive that is off, and makes the plant with this shaft at rest.
     ///
     /// # Errors
     /// If the plant is refused.
-    pub fn new(config: &Config, drive: &Drive, load: Load, seed: u64) -> Result<Self, Error> {
+    pub fn new(config: &'a Config, drive: &Drive, shaft: Shaft, seed: u64) -> Result<Self, Error> {
         let mut settings = plant_settings(config);
+        let (load, mode) = match shaft {
+            Shaft::Locked => (Load::Locked, Mode::Torque),
+            Shaft::Held(_) => (Load::Speed { speed: 0.0 }, Mode::Torque),
+            Shaft::Free => (Load::Free { torque: 0.0 }, Mode::Speed),
+        };
         settings.mechanics.load = load;
         let mut plant = Plant::new(&settings, seed).map_err(Error::refused)?;
         plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;
         let dc_link_v = (settings.inverter.vdc, settings.inverter.vdc);
         Ok(Self {
             rig: Rig::of(plant, drive.clone()),
+            config,
+            shaft,
+            mode,
             nominal_flux: settings.machine.lm * f64::from(config.drive.i_d()),
             counted_from: None,
             torque: Stats::default(),
             trial: Trial { seed, dc_link_v, ..Trial::default() },
+            taken: 0.0,
             error_deg: 0.0,
             wrong_deg: WRONG_DEG,
             trace: None,
@@ -110,8 +131,19 @@ impl Bench {
             was_off: false,
             is_off: false,
             turned: false,
-            mode: Mode::Torque,
+            has_ended: false,
         })
+    }
+
+    /// Makes a bench whose drive regulates torque while a dynamometer holds this speed, rpm, if it gets there.
+    ///
+    /// # Errors
+    /// If the plant is refused.
+    pub fn held(config: &'a Config, drive: &Drive, rpm: f64, seed: u64) -> Result<Self, Error> {
+        let mut bench = Self::new(config, drive, Shaft::Held(rpm), seed)?;
+        bench.start();
+        bench.bring_up()?;
+        Ok(bench)
     }
 
     /// Time from the beginning, s.
@@ -159,56 +191,141 @@ impl Bench {
         self.rig.drive.state()
     }
 
-    /// Starts, and waits until the drive regulates.
+    /// Starts, and waits until the drive regulates. If it does not, the run has ended.
+    pub fn start(&mut self) {
+        let refused = match self.rig.command(&Command::Start(self.mode)) {
+            Err(why) => Refused::Otherwise(why.to_string()),
+            Ok(_) => match self.wait(LONGEST_START_S) {
+                state if state.regulates() => return,
+                State::Fault(fault) => Refused::Start(fault.code()),
+                other => Refused::Otherwise(format!("the drive is {other}")),
+            },
+        };
+        (self.trial.refused, self.has_ended) = (Some(refused), true);
+    }
+
+    /// Brings a held shaft up to speed without torque.
     ///
     /// # Errors
-    /// The reason why it does not.
-    pub fn start(&mut self, mode: Mode) -> Result<(), Refused> {
-        self.mode = mode;
-        let started = self.rig.command(&Command::Start(mode));
-        started.map_err(|why| Refused::Otherwise(why.to_string()))?;
-        match self.wait(LONGEST_START_S) {
-            state if state.regulates() => Ok(()),
-            State::Fault(fault) => Err(Refused::Start(fault.code())),
-            other => Err(Refused::Otherwise(format!("the drive is {other}"))),
+    /// If the speed is out of range.
+    pub fn bring_up(&mut self) -> Result<(), Error> {
+        let Shaft::Held(rpm) = self.shaft else { return Ok(()) };
+        let speed = self.config.rpm(rpm) * TAU / 60.0;
+        let steps = (rpm.abs() / RAMP_RPM_PER_S / PACE_S).ceil() as u32;
+        for n in 1..=steps {
+            self.rig.set_load(Load::Speed { speed: speed * f64::from(n) / f64::from(steps) })?;
+            self.watch(PACE_S);
         }
+        self.watch(AT_SPEED_S);
+        Ok(())
+    }
+
+    /// Counts the error after this many seconds.
+    pub fn count_after(&mut self, seconds: f64) {
+        self.counted_from = Some(self.time() + seconds);
+    }
+
+    /// Runs the parts.
+    ///
+    /// # Errors
+    /// If the plant refuses a change, or the drive a reference.
+    pub fn follow(&mut self, parts: &[Part]) -> Result<(), Error> {
+        for part in parts {
+            if self.mode == Mode::Speed {
+                self.rig.set_load(Load::Free { torque: part.load_nm })?;
+            }
+            let steps = f64::from(part.steps());
+            for n in 1..=part.steps() {
+                if self.has_ended {
+                    return Ok(());
+                }
+                let n = f64::from(n);
+                self.change(part.change, n, steps)?;
+                if let Some(reference) = part.reference {
+                    self.command(reference.after(n, steps))?;
+                }
+                self.watch(part.seconds / steps);
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes a change, as far as it is in this one of all steps.
+    fn change(&mut self, change: Change, n: f64, steps: f64) -> Result<(), Error> {
+        let (config, plant) = (self.config, &mut self.rig.plant);
+        let done = match change {
+            Change::Flux(degrees) if n == 1.0 => {
+                // From now on the error is no longer counted, and the durations for which angle and flux are off start again.
+                plant.turn_rotor_flux(degrees.to_radians());
+                (self.turned, self.counted_from) = (true, None);
+                self.lasting = Default::default();
+                Ok(())
+            }
+            Change::Mains(volts) => plant.set_mains(volts),
+            Change::Shaft(rpm) => {
+                plant.set_load(Load::Speed { speed: config.rpm(rpm.after(n, steps)) * TAU / 60.0 })
+            }
+            Change::DcLink(share) => {
+                plant.set_dc_link(config.inverter.dc_link_v * share.after(n, steps))
+            }
+            Change::Warming(stator, rotor) => {
+                let (machine, share) = (plant_settings(config).machine, n / steps);
+                let warmer = |ohm: f64, rise: f64| ohm * (1.0 + rise * share);
+                plant.set_resistances(warmer(machine.rs, stator), warmer(machine.rr, rotor))
+            }
+            Change::Nothing | Change::Flux(_) => Ok(()),
+        };
+        done.map_err(Error::refused)
+    }
+
+    /// Commands a reference of a part.
+    fn command(&mut self, reference: f64) -> Result<(), Error> {
+        match self.mode {
+            Mode::Speed => {
+                let rpm = self.config.rpm(reference) as f32;
+                self.taken = rpm.into();
+                self.rig.command(&Command::Speed(rpm)).map(drop)
+            }
+            _ => self.command_torque(share_of_limit(self.config, reference)),
+        }
+    }
+
+    /// Commands a q-axis current, A peak, which the drive may limit, unless the run has ended.
+    ///
+    /// # Errors
+    /// If the drive refuses it.
+    pub fn command_torque(&mut self, i_q: f64) -> Result<(), Error> {
+        if self.has_ended {
+            return Ok(());
+        }
+        let i_q = i_q as f32;
+        self.taken = match self.rig.command(&Command::Torque(i_q))? {
+            Accepted::Limited(taken) => taken.into(),
+            Accepted::AsGiven => i_q.into(),
+        };
+        Ok(())
     }
 
     /// Returns the mean torque minus that of the accepted q-axis current, A, in the direction of the current and
     /// relative to the torque at the nominal limit.
-    pub fn torque_error(&self, config: &Config, i_q: f64) -> f64 {
-        let error = (self.torque.mean() - torque_nm(config, i_q)) * i_q.signum();
-        error / torque_nm(config, nominal_limit_a(config))
+    pub fn torque_error(&self, i_q: f64) -> f64 {
+        let error = (self.torque.mean() - torque_nm(self.config, i_q)) * i_q.signum();
+        error / torque_nm(self.config, nominal_limit_a(self.config))
     }
 
-    /// Commands a q-axis current, A peak; returns the current that the drive accepts, which may be limited.
-    ///
-    /// # Errors
-    /// If the drive refuses it.
-    pub fn torque(&mut self, i_q: f32) -> Result<f32, Error> {
-        match self.rig.command(&Command::Torque(i_q))? {
-            Accepted::Limited(taken) => Ok(taken),
-            Accepted::AsGiven => Ok(i_q),
-        }
-    }
-
-    /// Rotates the rotor flux of the motor at once. From then on the error is no longer counted, and the durations for
-    /// which angle and flux are off start again.
-    pub fn turn_flux(&mut self, degrees: f64) {
-        self.rig.plant.turn_rotor_flux(degrees.to_radians());
-        (self.turned, self.counted_from) = (true, None);
-        self.lasting = Default::default();
-    }
-
-    /// Runs for some seconds, or until the drive no longer regulates; returns whether it still does.
-    pub fn watch(&mut self, seconds: f64) -> bool {
+    /// Runs for some seconds, unless the run has ended. It ends as soon as the drive no longer regulates.
+    pub fn watch(&mut self, seconds: f64) {
         for _ in 0..(seconds * RATE_HZ).round() as u64 {
+            if self.has_ended {
+                return;
+            }
             let (t, plant) = (self.time(), &self.rig.plant);
             let (flux, torque) = (plant.rotor_flux(), plant.torque());
             self.step();
             let drive = &self.rig.drive;
             if !drive.state().regulates() {
-                return false;
+                self.has_ended = true;
+                return;
             }
             let estimate = f64::from(drive.telemetry().phi.to_turns());
             let error = wrapped_degrees(flux.arg() - estimate * TAU);
@@ -229,18 +346,18 @@ impl Bench {
             }
             self.was_off |= self.is_off && (self.turned || self.counted_from.is_some());
         }
-        true
     }
 
-    /// Returns the result of the run and its curves; `still` tells whether the drive regulated to its end.
-    pub fn finish(self, still: bool) -> (Trial, Vec<Moment>) {
+    /// Returns the result of the run, and its curves.
+    pub fn finish(self) -> (Trial, Vec<Moment>) {
         let mut trial = self.trial;
-        if !still && let State::Fault(fault) = self.rig.drive.state() {
+        let stopped = self.has_ended && trial.refused.is_none();
+        if let (true, State::Fault(fault)) = (stopped, self.rig.drive.state()) {
             trial.trip = Some(fault.code());
             trial.sound_stop = !self.was_off;
         }
         [trial.wrong_s, trial.lost_s, trial.flux_off_s] = self.lasting.map(|state| state.longest);
-        trial.stuck = still && self.is_off && trial.is_silent();
+        trial.stuck = !stopped && self.is_off && trial.is_silent();
         let classes = (0..).zip(self.counts).filter(|(_, count)| *count > 0);
         trial.histogram = classes.collect();
         (trial, self.trace.unwrap_or_default())

@@ -2,6 +2,7 @@
 
 use super::disturbed::Asymmetry;
 use crate::config::BatteryRuns;
+use crate::experiments::course::{Change, Part, Ramp, Shaft};
 use crate::prelude::*;
 
 /// A kind of run. Currents, speeds and torques are for the dissertation's motor; on others they are in proportion,
@@ -124,75 +125,6 @@ const DRAGGED_RPM: (f64, f64) = (150.0, 300.0);
 const UNLOADED_RPM_PER_S: f64 = 600.0;
 const DRAGGED_S: (f64, f64) = (1.5, 20.0);
 
-/// A load torque.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LoadTorque {
-    /// Torque in Nm on the dissertation's motor; see [`Config::newton_metres`].
-    Nm(f64),
-    /// Share of the torque at the [nominal limit](nominal_limit_a).
-    Share(f64),
-}
-
-impl LoadTorque {
-    /// Returns the torque in Nm on the motor of the configuration.
-    pub fn newton_metres(self, config: &Config) -> f64 {
-        match self {
-            Self::Nm(torque) => config.newton_metres(torque),
-            Self::Share(share) => share * torque_nm(config, nominal_limit_a(config)),
-        }
-    }
-}
-
-/// A part of a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
-    /// q-axis current, A, or speed, rpm, at the beginning and at the end; a straight line between them.
-    pub reference: (f64, f64),
-    /// Torque of the load, if the shaft is free.
-    pub load: LoadTorque,
-    /// Speed of the dynamometer at the beginning and at the end, rpm; a straight line between them. None: unchanged.
-    pub shaft_rpm: Option<(f64, f64)>,
-    /// Rotation of the rotor flux at the beginning, electrical degrees.
-    pub turn_deg: f64,
-    /// Duration, s.
-    pub seconds: f64,
-}
-
-impl Part {
-    /// Makes a part with a constant reference.
-    pub fn constant(reference: f64, seconds: f64) -> Self {
-        let reference = (reference, reference);
-        Self { reference, load: LoadTorque::Nm(0.0), shaft_rpm: None, turn_deg: 0.0, seconds }
-    }
-
-    /// Makes a part with a constant q-axis current while the dynamometer changes its speed by this many rpm/s.
-    fn dragged(i_q: f64, rpm: (f64, f64), rate: f64) -> Self {
-        Self { shaft_rpm: Some(rpm), ..Self::constant(i_q, (rpm.1 - rpm.0).abs() / rate) }
-    }
-}
-
-/// The shaft in a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shaft {
-    /// The shaft is locked.
-    Locked,
-    /// A dynamometer holds a speed, rpm.
-    Held(f64),
-    /// The shaft is free; the drive regulates its speed.
-    Free,
-}
-
-impl Shaft {
-    /// Returns the load at the beginning, and the quantity that the drive regulates.
-    pub fn at_rest(self) -> (Load, Mode) {
-        match self {
-            Self::Locked => (Load::Locked, Mode::Torque),
-            Self::Held(_) => (Load::Speed { speed: 0.0 }, Mode::Torque),
-            Self::Free => (Load::Free { torque: 0.0 }, Mode::Speed),
-        }
-    }
-}
-
 impl Kind {
     /// Describes the kind in words.
     pub fn name(self) -> String {
@@ -236,7 +168,7 @@ impl Kind {
     }
 
     /// Returns the parts of a run, with random values.
-    pub fn parts(self, random: &mut impl Rng) -> Vec<Part> {
+    pub fn parts(self, config: &Config, random: &mut impl Rng) -> Vec<Part> {
         let sign = sign(random);
         match self {
             Self::Constant(_) => {
@@ -253,26 +185,27 @@ impl Kind {
                 .map(|n| Part::constant(if n % 2 == 0 { sign } else { -sign } * MOST_A, 1.0))
                 .collect(),
             Self::Ramp => {
-                let ramp = (-sign * MOST_A, sign * MOST_A);
-                let begin = Part::constant(ramp.0, LEVEL_S);
-                vec![begin, Part { reference: ramp, ..Part::constant(0.0, 3.0) }]
+                let ramp = Ramp(-sign * MOST_A, sign * MOST_A);
+                vec![Part::constant(ramp.0, LEVEL_S), Part::ramp(ramp, 3.0)]
             }
             Self::Speed(rpm) => {
                 vec![Part::constant(rpm.into(), 2.0), Part::constant(-f64::from(rpm), 2.0)]
             }
             Self::Load | Self::LoadStep(_) => {
                 let rpm = LOAD_RPM[random.random_range(0..LOAD_RPM.len())];
-                let load = match self {
-                    Self::LoadStep(share) => LoadTorque::Share(sign * f64::from(share) / 1e3),
-                    _ => LoadTorque::Nm(sign * LOAD_NM),
+                let load_nm = match self {
+                    Self::LoadStep(share) => {
+                        sign * f64::from(share) / 1e3 * torque_nm(config, nominal_limit_a(config))
+                    }
+                    _ => config.newton_metres(sign * LOAD_NM),
                 };
                 // The load comes and goes while the speed is held.
-                let loaded = Part { load, ..Part::constant(rpm, 2.0) };
+                let loaded = Part { load_nm, ..Part::constant(rpm, 2.0) };
                 vec![Part::constant(rpm, 1.5), loaded, Part::constant(rpm, 1.0)]
             }
             Self::Forced(_) => {
                 let i_q = sign * random.random_range(0.0..=MOST_A);
-                let turned = Part { turn_deg: turn(random), ..Part::constant(i_q, TURN_S.1) };
+                let turned = Part { change: turn(random), ..Part::constant(i_q, TURN_S.1) };
                 vec![Part::constant(i_q, TURN_S.0), turned]
             }
             Self::Dragged(_) => {
@@ -285,10 +218,9 @@ impl Kind {
                 let (mut parts, ends) = if random.random() {
                     (Vec::new(), (0.0, braked))
                 } else {
-                    (vec![Part::dragged(0.0, (0.0, braked), UNLOADED_RPM_PER_S)], (braked, 0.0))
+                    (vec![dragged(0.0, (0.0, braked), UNLOADED_RPM_PER_S)], (braked, 0.0))
                 };
-                let dragged = Part::dragged(i_q, ends, rate);
-                parts.extend([held(DRAGGED_S.0), dragged, held(DRAGGED_S.1)]);
+                parts.extend([held(DRAGGED_S.0), dragged(i_q, ends, rate), held(DRAGGED_S.1)]);
                 parts
             }
             Self::Quadrants => {
@@ -296,7 +228,7 @@ impl Kind {
                 let (there, back) =
                     ((DRAGGED_RPM.0, -DRAGGED_RPM.0), (-DRAGGED_RPM.0, DRAGGED_RPM.0));
                 let mut drag = |sign: f64, rpm| {
-                    Part::dragged(sign * random.random_range(LEAST_A..=MOST_A), rpm, rate)
+                    dragged(sign * random.random_range(LEAST_A..=MOST_A), rpm, rate)
                 };
                 vec![drag(sign, there), drag(sign, back), drag(-sign, there), drag(-sign, back)]
             }
@@ -304,11 +236,11 @@ impl Kind {
                 let middle = sign * random.random_range(0.0..=MOST_A - RESTLESS_A);
                 let turned = (TURN_S.0 * f64::from(hz)) as usize;
                 let parts = ((TURN_S.0 + TURN_S.1) * f64::from(hz)) as usize;
-                let turn_deg = if forced { turn(random) } else { 0.0 };
+                let turn = if forced { turn(random) } else { Change::Nothing };
                 let steps = (0..parts).map(|number| {
                     let i_q = middle + random.random_range(-RESTLESS_A..=RESTLESS_A);
-                    let turn_deg = if number == turned { turn_deg } else { 0.0 };
-                    Part { turn_deg, ..Part::constant(i_q, 1.0 / f64::from(hz)) }
+                    let change = if number == turned { turn } else { Change::Nothing };
+                    Part { change, ..Part::constant(i_q, 1.0 / f64::from(hz)) }
                 });
                 steps.collect()
             }
@@ -316,9 +248,15 @@ impl Kind {
     }
 }
 
-/// Returns a random rotation of the flux, degrees, of either sign.
-fn turn(random: &mut impl Rng) -> f64 {
-    sign(random) * random.random_range(TURN_DEG.0..=TURN_DEG.1)
+/// Makes a part with a constant q-axis current while the dynamometer changes its speed by this many rpm/s.
+fn dragged(i_q: f64, rpm: (f64, f64), rate: f64) -> Part {
+    let change = Change::Shaft(Ramp(rpm.0, rpm.1));
+    Part { change, ..Part::constant(i_q, (rpm.1 - rpm.0).abs() / rate) }
+}
+
+/// Returns a random rotation of the flux of either sign.
+fn turn(random: &mut impl Rng) -> Change {
+    Change::Flux(sign(random) * random.random_range(TURN_DEG.0..=TURN_DEG.1))
 }
 
 /// Returns the q-axis current that a drive which is off would accept if commanded this one, A peak.
@@ -352,9 +290,8 @@ mod tests {
         config.battery.load_share = 0.62;
         let (kinds, runs) = chosen(&config);
         assert_eq!((kinds.as_slice(), runs), (&[Kind::LoadStep(620)][..], 32));
-        let parts = kinds[0].parts(&mut seeded(1));
-        let loads: Vec<f64> =
-            parts.iter().map(|part| part.load.newton_metres(&config).abs()).collect();
+        let parts = kinds[0].parts(&config, &mut seeded(1));
+        let loads: Vec<f64> = parts.iter().map(|part| part.load_nm.abs()).collect();
         assert_eq!((loads[0], loads[2]), (0.0, 0.0));
         assert!((loads[1] - 1.637).abs() < 2e-3, "{loads:?}");
     }
@@ -378,15 +315,13 @@ mod tests {
     /// once. Torque of either sign is present while the speed passes zero in either direction.
     #[test]
     fn quadrants_are_all_four() {
-        let parts = Kind::Quadrants.parts(&mut seeded(1));
+        let parts = Kind::Quadrants.parts(&Config::default(), &mut seeded(1));
         let ways = parts.iter().map(|part| {
-            let (from, to) = part.shaft_rpm.unwrap();
-            assert!(
-                from * to < 0.0
-                    && part.reference.0.abs() >= LEAST_A
-                    && part.reference.0 == part.reference.1
-            );
-            (part.reference.0 > 0.0, to > from)
+            let (Change::Shaft(rpm), i_q) = (part.change, part.reference.unwrap()) else {
+                panic!()
+            };
+            assert!(rpm.0 * rpm.1 < 0.0 && i_q.0.abs() >= LEAST_A && i_q.0 == i_q.1);
+            (i_q.0 > 0.0, rpm.1 > rpm.0)
         });
         let mut ways: Vec<_> = ways.collect();
         ways.sort_unstable();
@@ -399,18 +334,20 @@ mod tests {
         config.battery.runs = BatteryRuns::Restless;
         for kind in chosen(&config).0 {
             let Kind::Restless { hz, forced } = kind else { continue };
-            let parts = kind.parts(&mut seeded(3));
+            let parts = kind.parts(&config, &mut seeded(3));
             assert_eq!(parts.len(), 5 * usize::from(hz));
             let seconds: f64 = parts.iter().map(|part| part.seconds).sum();
             assert!((seconds - 5.0).abs() < 1e-6, "{seconds}");
-            let steps = parts.windows(2).map(|two| (two[1].reference.0 - two[0].reference.0).abs());
+            let i_q = |part: &Part| part.reference.unwrap().0;
+            let steps = parts.windows(2).map(|two| (i_q(&two[1]) - i_q(&two[0])).abs());
             // Two uniform values within ±0.2 A differ by 0.133 A in the mean.
             let mean = steps.sum::<f64>() / (parts.len() - 1) as f64;
             assert!((mean - 0.133).abs() < 0.015, "{hz}: {mean}");
-            let turns: Vec<f64> =
-                parts.iter().map(|part| part.turn_deg.abs()).filter(|turn| *turn > 0.0).collect();
-            assert_eq!(turns.len(), usize::from(forced));
-            assert!(turns.iter().all(|turn| (60.0..=180.0).contains(turn)));
+            let turns = parts.iter().filter(|part| match part.change {
+                Change::Flux(turn) => (60.0..=180.0).contains(&turn.abs()),
+                _ => false,
+            });
+            assert_eq!(turns.count(), usize::from(forced));
         }
     }
 }

@@ -1,16 +1,13 @@
 //! One run of the stress test.
 
 use super::bench::Bench;
-use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, share_of_limit};
+use super::kind::{Kind, allowed_a, nominal_limit_a};
 use super::trial::Trial;
+use crate::experiments::course::Shaft;
 use crate::prelude::*;
 
 /// Time after the first reference that the statistics of the error exclude, s: the angle settles.
 const SETTLING_S: f64 = 0.5;
-/// Step time of a reference that changes gradually, s.
-const PACE_S: f64 = 0.01;
-/// Acceleration of the dynamometer, rpm/s.
-const RAMP_RPM_PER_S: f64 = 600.0;
 /// Longest saliency self-commissioning, s.
 const LONGEST_LEARNING_S: f64 = 1000.0;
 
@@ -20,7 +17,7 @@ const LONGEST_LEARNING_S: f64 = 1000.0;
 /// # Errors
 /// If the plant is refused, or the drive neither learns nor gives a reason.
 pub fn learned(config: &Config, drive: Drive, seed: u64) -> Result<Result<Drive, u8>, Error> {
-    let mut bench = Bench::new(config, &drive, Load::Locked, seed)?;
+    let mut bench = Bench::new(config, &drive, Shaft::Locked, seed)?;
     bench.rig.command(&Command::Start(Mode::Learning))?;
     match bench.wait(LONGEST_LEARNING_S) {
         State::Off => Ok(Ok(bench.rig.drive)),
@@ -36,98 +33,23 @@ pub fn learned(config: &Config, drive: Drive, seed: u64) -> Result<Result<Drive,
 /// # Errors
 /// If the plant is refused, or the drive refuses a command.
 pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Trial, Error> {
-    let mut random = seeded(seed);
-    let parts = kind.parts(&mut random);
+    let parts = kind.parts(config, &mut seeded(seed));
     let nominal = nominal_limit_a(config);
-    let (load, mode) = kind.shaft().at_rest();
-    let mut bench = Bench::new(config, drive, load, seed)?;
-    bench.trial.kind = Some(kind);
-    let references = parts.iter().map(|part| part.reference.1);
-    let drawn = if mode == Mode::Speed { &mut bench.trial.rpm } else { &mut bench.trial.i_q };
+    let mut bench = Bench::new(config, drive, kind.shaft(), seed)?;
+    let result = &mut bench.trial;
+    result.kind = Some(kind);
+    let references = parts.iter().filter_map(|part| part.reference).map(|ramp| ramp.1);
+    let drawn = if kind.shaft() == Shaft::Free { &mut result.rpm } else { &mut result.i_q };
     *drawn = references.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
-    bench.trial.limit_share = allowed_a(drive, nominal).ok().map(|taken| taken / nominal);
-    if let Err(refused) = bench.start(mode) {
-        bench.trial.refused = Some(refused);
-        return Ok(bench.finish(true).0);
+    result.limit_share = allowed_a(drive, nominal).ok().map(|taken| taken / nominal);
+    bench.start();
+    bench.bring_up()?;
+    bench.count_after(SETTLING_S);
+    bench.follow(&parts)?;
+    if matches!(kind, Kind::Constant(_)) && !bench.has_ended {
+        bench.trial.torque_error = Some(bench.torque_error(bench.taken));
     }
-    let mut still = bring_up(&mut bench, kind.shaft(), config)?;
-    if still {
-        bench.counted_from = Some(bench.time() + SETTLING_S);
-        let taken = follow(&mut bench, config, &parts)?;
-        still = taken.is_some();
-        let constant = taken.filter(|_| matches!(kind, Kind::Constant(_)));
-        bench.trial.torque_error = constant.map(|i_q| bench.torque_error(config, i_q));
-    }
-    Ok(bench.finish(still).0)
-}
-
-/// Makes a bench whose drive regulates torque while a dynamometer holds this speed, rpm; none if the drive did not reach that state.
-///
-/// # Errors
-/// If the plant is refused.
-pub fn held(config: &Config, drive: &Drive, rpm: f64, seed: u64) -> Result<Option<Bench>, Error> {
-    let shaft = Shaft::Held(rpm);
-    let (load, mode) = shaft.at_rest();
-    let mut bench = Bench::new(config, drive, load, seed)?;
-    let regulates = bench.start(mode).is_ok() && bring_up(&mut bench, shaft, config)?;
-    Ok(regulates.then_some(bench))
-}
-
-/// Brings a held shaft up to speed without torque; returns whether the drive regulated to the end.
-///
-/// # Errors
-/// If the plant is refused.
-pub fn bring_up(bench: &mut Bench, shaft: Shaft, config: &Config) -> Result<bool, Error> {
-    let Shaft::Held(rpm) = shaft else { return Ok(true) };
-    let speed = config.rpm(rpm) * TAU / 60.0;
-    let steps = (rpm.abs() / RAMP_RPM_PER_S / PACE_S).ceil() as u32;
-    for n in 1..=steps {
-        bench.rig.set_load(Load::Speed { speed: speed * f64::from(n) / f64::from(steps) })?;
-        if !bench.watch(PACE_S) {
-            return Ok(false);
-        }
-    }
-    Ok(bench.watch(0.3))
-}
-
-/// Follows the references. Returns the last reference as the drive accepted it, A or rpm; none if it did not regulate
-/// to the end.
-///
-/// # Errors
-/// If the plant is refused, or the drive refuses a reference.
-pub fn follow(bench: &mut Bench, config: &Config, parts: &[Part]) -> Result<Option<f64>, Error> {
-    let mut taken = 0.0;
-    for part in parts {
-        if bench.mode == Mode::Speed {
-            bench.rig.set_load(Load::Free { torque: part.load.newton_metres(config) })?;
-        }
-        if part.turn_deg != 0.0 {
-            bench.turn_flux(part.turn_deg);
-        }
-        let changes = part.reference.0 != part.reference.1 || part.shaft_rpm.is_some();
-        let steps = if changes { (part.seconds / PACE_S).round() as u32 } else { 1 };
-        for n in 1..=steps {
-            let between =
-                |(from, to): (f64, f64)| from + (to - from) * f64::from(n) / f64::from(steps);
-            let reference = between(part.reference);
-            if let Some(rpm) = part.shaft_rpm.map(between) {
-                bench.rig.set_load(Load::Speed { speed: config.rpm(rpm) * TAU / 60.0 })?;
-            }
-            taken = match bench.mode {
-                Mode::Speed => {
-                    let rpm = config.rpm(reference) as f32;
-                    bench.rig.command(&Command::Speed(rpm))?;
-                    rpm
-                }
-                _ => bench.torque(share_of_limit(config, reference) as f32)?,
-            }
-            .into();
-            if !bench.watch(part.seconds / f64::from(steps)) {
-                return Ok(None);
-            }
-        }
-    }
-    Ok(Some(taken))
+    Ok(bench.finish().0)
 }
 
 #[cfg(test)]
@@ -135,6 +57,7 @@ mod tests {
     use super::super::disturbed::Asymmetry;
     use super::super::kind::torque_nm;
     use super::*;
+    use crate::experiments::course::Change;
 
     /// A lower limit is visible in every run, and the torque is judged by the accepted command. With 0.5 A for any
     /// command the error stays that of a healthy drive, a few per cent of the torque at the limit.
@@ -173,18 +96,19 @@ mod tests {
         let (mut into, mut out_of, mut rates) = (0, 0, Vec::new());
         for seed in 0..12 {
             let kind = Kind::Dragged(Asymmetry::None);
-            let mut parts = kind.parts(&mut seeded(seed));
-            let dragged = parts.iter().rev().find(|part| part.shaft_rpm.is_some()).unwrap();
-            let (rpm, sign) = (dragged.shaft_rpm.unwrap(), dragged.reference.0.signum());
+            let mut parts = kind.parts(&config, &mut seeded(seed));
+            let dragged = parts[parts.len() - 2];
+            let Change::Shaft(rpm) = dragged.change else { panic!("{dragged:?}") };
+            let sign = dragged.reference.unwrap().0.signum();
             rates.push((rpm.1 - rpm.0).abs() / dragged.seconds);
             // The long hold is not needed.
             parts.last_mut().unwrap().seconds = 0.5;
-            let load = Load::Speed { speed: 0.0 };
-            let mut bench = Bench::new(&config, &drive, load, seed).unwrap();
+            let mut bench = Bench::new(&config, &drive, kind.shaft(), seed).unwrap();
             bench.trace = Some(Vec::new());
-            bench.start(Mode::Torque).unwrap();
+            bench.start();
             let started = bench.time();
-            assert!(follow(&mut bench, &config, &parts).unwrap().is_some(), "{seed}");
+            bench.follow(&parts).unwrap();
+            assert!(!bench.has_ended, "{seed}");
             // Frequency of the flux over 0.2 s, Hz, in the direction of the torque.
             let moments = bench.trace.unwrap();
             let torque: Vec<_> = moments.iter().filter(|m| m.t > started + 1.5).collect();

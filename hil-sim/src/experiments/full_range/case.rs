@@ -1,6 +1,6 @@
 //! The cases: each kind in the regions of the speed for which it is intended.
 
-use crate::experiments::battery::Shaft;
+use crate::experiments::course::Shaft;
 use crate::prelude::*;
 
 /// Limits of the regions, rpm on four poles. The angle comes from the injection alone up to 450 rpm and from the

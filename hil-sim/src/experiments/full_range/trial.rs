@@ -1,10 +1,8 @@
 //! One run, and its record.
 
 use super::case::Case;
-use crate::experiments::battery::{
-    Bench, LONGEST_START_S, LoadTorque, Moment, Part, Refused, Shaft, Trial, bring_up, follow,
-    nominal_limit_a,
-};
+use crate::experiments::battery::{Bench, LONGEST_START_S, Moment, Trial, nominal_limit_a};
+use crate::experiments::course::{Change, Part, Ramp, Shaft};
 use crate::prelude::*;
 
 /// Smallest and largest constant q-axis current, relative to the current limit.
@@ -57,33 +55,12 @@ pub fn set_up(case: Case, config: &mut Config) {
 /// A run: the bench, and its random values.
 pub struct Run<'a> {
     case: Case,
-    config: &'a Config,
     rpm: f64,
     i_q: f64,
     sign: f64,
     turn_deg: f64,
     off_s: f64,
-    bench: Bench,
-}
-
-/// Reasons for an early end of a run.
-enum End {
-    /// The drive does not start.
-    Refused(Refused),
-    /// The drive no longer regulates.
-    Stopped,
-    Failed(Error),
-}
-
-impl From<Error> for End {
-    fn from(error: Error) -> Self {
-        Self::Failed(error)
-    }
-}
-
-/// Continues while the drive regulates.
-fn still(regulates: bool) -> Result<(), End> {
-    if regulates { Ok(()) } else { Err(End::Stopped) }
+    bench: Bench<'a>,
 }
 
 impl<'a> Run<'a> {
@@ -102,10 +79,10 @@ impl<'a> Run<'a> {
         let sign = sign(&mut random);
         let turn_deg = sign * random.random_range(TURN_DEG.0..=TURN_DEG.1);
         let off_s = random.random_range(OFF_S.0..=OFF_S.1);
-        let mut bench = Bench::new(config, drive, case.shaft(rpm).at_rest().0, seed)?;
+        let mut bench = Bench::new(config, drive, case.shaft(rpm), seed)?;
         bench.trial = Trial { case: case.name(), rpm, i_q, ..bench.trial };
         bench.wrong_deg = LOST_DEG;
-        Ok(Self { case, config, rpm, i_q, sign, turn_deg, off_s, bench })
+        Ok(Self { case, rpm, i_q, sign, turn_deg, off_s, bench })
     }
 
     /// Does the run; with `traced` it also returns the curves.
@@ -114,168 +91,137 @@ impl<'a> Run<'a> {
     /// If the plant is refused, or the drive refuses a reference.
     pub fn run(mut self, traced: bool) -> Result<(Trial, Vec<Moment>), Error> {
         self.bench.trace = traced.then(Vec::new);
-        let still = match self.course() {
-            Ok(()) => true,
-            Err(End::Stopped) => false,
-            Err(End::Refused(why)) => {
-                self.bench.trial.refused = Some(why);
-                true
-            }
-            Err(End::Failed(error)) => return Err(error),
-        };
-        Ok(self.bench.finish(still))
+        self.course()?;
+        Ok(self.bench.finish())
     }
 
-    fn course(&mut self) -> Result<(), End> {
-        let (rpm, i_q, sign) = (self.rpm, self.i_q, self.sign);
-        let step = sign * STEP_A.min(nominal_limit_a(self.config) / self.config.amperes(1.0));
-        let loaded = |nm: f64| Part { load: LoadTorque::Nm(nm), ..Part::constant(rpm, 1.0) };
+    fn course(&mut self) -> Result<(), Error> {
         match self.case.kind {
             RangeKind::TurningStart => {}
-            RangeKind::Ramps | RangeKind::HotRamps => self.start()?,
+            RangeKind::Ramps | RangeKind::HotRamps => self.bench.start(),
             _ => self.up_to_speed()?,
         }
+        if self.bench.has_ended {
+            return Ok(());
+        }
         match self.case.kind {
-            RangeKind::Constant | RangeKind::WrongParameters => {
-                self.counted(0.5, &[Part::constant(i_q, 3.5)])?;
-                let taken = f64::from(self.bench.rig.drive.telemetry().reference.q);
-                self.bench.trial.torque_error = Some(self.bench.torque_error(self.config, taken));
-                Ok(())
-            }
-            RangeKind::Reversals => {
-                let steps = [step, -step, step, 0.0, -step].map(|a| Part::constant(a, 0.6));
-                self.counted(0.5, &steps)
-            }
-            RangeKind::LoadSteps => {
-                let nm = sign * LOAD_NM;
-                self.counted(0.0, &[nm, 0.0, -nm, 0.0].map(loaded))
-            }
-            RangeKind::Ramps | RangeKind::HotRamps => self.ramps(),
-            RangeKind::TurnedFlux => {
-                let turned = Part { turn_deg: self.turn_deg, ..Part::constant(i_q, 3.0) };
-                self.counted(0.5, &[Part::constant(i_q, 1.0), turned])
-            }
-            RangeKind::TurningStart => self.turning_start(),
+            RangeKind::TurningStart => return self.turning_start(),
             RangeKind::ResidualStart => {
                 // A drive that has stopped itself refuses this command.
                 let _ = self.bench.rig.command(&Command::Stop(Stop::Coast));
                 self.bench.wait(LONGEST_START_S);
                 self.bench.coast(self.off_s);
-                self.turning_start()
+                return self.turning_start();
             }
-            RangeKind::Braking => self.braking(),
-            RangeKind::Outage => {
-                let nominal = self.config.inverter.dc_link_v;
-                self.bench.counted_from = Some(self.bench.time());
-                for (mains, seconds) in [(0.0, OUTAGE_S), (nominal, 2.0)] {
-                    self.bench.rig.plant.set_mains(mains).map_err(Error::refused)?;
-                    self.follow(&[Part::constant(rpm, seconds)])?;
-                }
-                Ok(())
+            RangeKind::LoadSteps | RangeKind::Ramps | RangeKind::HotRamps | RangeKind::Outage => {
+                self.bench.count_after(0.0);
             }
-            RangeKind::Sag => self.sag(),
+            RangeKind::Braking => return self.braking(),
+            _ => self.bench.count_after(0.5),
         }
-    }
-
-    /// Starts, and waits until the drive regulates.
-    fn start(&mut self) -> Result<(), End> {
-        self.bench.start(self.case.shaft(self.rpm).at_rest().1).map_err(End::Refused)
-    }
-
-    /// Starts at rest and brings the shaft up to speed, without torque or by the drive's regulation.
-    fn up_to_speed(&mut self) -> Result<(), End> {
-        self.start()?;
-        let shaft = self.case.shaft(self.rpm);
-        still(bring_up(&mut self.bench, shaft, self.config)?)?;
-        if shaft != Shaft::Free {
-            return Ok(());
+        self.bench.follow(&self.parts())?;
+        let is_constant =
+            matches!(self.case.kind, RangeKind::Constant | RangeKind::WrongParameters);
+        if is_constant && !self.bench.has_ended {
+            let taken = f64::from(self.bench.rig.drive.telemetry().reference.q);
+            self.bench.trial.torque_error = Some(self.bench.torque_error(taken));
         }
-        let ramp = f64::from(self.config.drive.ramp_rpm_per_s());
-        let seconds = self.config.rpm(self.rpm.abs()) / ramp + 1.5;
-        self.follow(&[Part::constant(self.rpm, seconds)])
-    }
-
-    fn follow(&mut self, parts: &[Part]) -> Result<(), End> {
-        still(follow(&mut self.bench, self.config, parts)?.is_some())
-    }
-
-    /// Follows the parts, and counts the error after this many seconds.
-    fn counted(&mut self, after: f64, parts: &[Part]) -> Result<(), End> {
-        self.bench.counted_from = Some(self.bench.time() + after);
-        self.follow(parts)
-    }
-
-    /// Ramps through zero and back, with or without warming of the motor on the way.
-    fn ramps(&mut self) -> Result<(), End> {
-        let rate = f64::from(self.config.drive.ramp_rpm_per_s());
-        let once = self.config.rpm(self.rpm.abs()) / rate;
-        let rpm = self.rpm;
-        self.counted(0.0, &[Part::constant(rpm, once + 0.7)])?;
-        if self.case.kind == RangeKind::HotRamps {
-            let machine = plant_settings(self.config).machine;
-            let steps = 100;
-            for n in 1..=steps {
-                let share = f64::from(n) / f64::from(steps);
-                let rs = machine.rs * (1.0 + RISE.0 * share);
-                let rr = machine.rr * (1.0 + RISE.1 * share);
-                self.bench.rig.plant.set_resistances(rs, rr).map_err(Error::refused)?;
-                still(self.bench.watch(WARMING_S / f64::from(steps)))?;
-            }
-        }
-        self.follow(&[Part::constant(-rpm, 2.0 * once + 0.7), Part::constant(0.0, once + 1.0)])
-    }
-
-    /// Starts while a dynamometer turns the shaft, then commands torque.
-    fn turning_start(&mut self) -> Result<(), End> {
-        let speed = self.config.rpm(self.rpm) * TAU / 60.0;
-        self.bench.rig.set_load(Load::Speed { speed })?;
-        let (from, i_q) = (self.bench.time(), self.sign * CAUGHT_A);
-        self.bench.trial.peak_a = 0.0;
-        self.start()?;
-        // The error of the first samples belongs to the search for the flux.
-        let before = self.bench.trial.largest_deg;
-        loop {
-            still(self.bench.watch(1.0 / 600.0))?;
-            if self.bench.error_deg.abs() < CAUGHT_DEG {
-                break;
-            }
-            if self.bench.time() - from > LONGEST_CATCH_S {
-                return Ok(());
-            }
-        }
-        self.bench.trial.largest_deg = before;
-        self.bench.trial.took_s = Some(self.bench.time() - from);
-        self.counted(0.1, &[Part::constant(i_q, 0.7)])
-    }
-
-    /// Brakes from full speed to standstill.
-    fn braking(&mut self) -> Result<(), End> {
-        let from = self.bench.time();
-        self.bench.counted_from = Some(from);
-        let stopped = self.config.rpm(STOPPED_RPM) * TAU / 60.0;
-        while self.bench.rig.plant.mechanical_speed().abs() > stopped {
-            self.follow(&[Part::constant(0.0, 0.02)])?;
-            if self.bench.time() - from > LONGEST_STOP_S {
-                return Ok(());
-            }
-        }
-        self.bench.trial.took_s = Some(self.bench.time() - from);
         Ok(())
     }
 
-    /// The voltage of a stiff dc link falls and returns under torque.
-    fn sag(&mut self) -> Result<(), End> {
-        self.counted(0.5, &[Part::constant(self.i_q, 1.0)])?;
-        let nominal = self.config.inverter.dc_link_v;
-        for (from, to) in [(1.0, SAG), (SAG, 1.0)] {
-            let steps = 60;
-            for n in 1..=steps {
-                let share = from + (to - from) * f64::from(n) / f64::from(steps);
-                self.bench.rig.plant.set_dc_link(nominal * share).map_err(Error::refused)?;
-                still(self.bench.watch(SAG_RAMP_S / f64::from(steps)))?;
-            }
-            still(self.bench.watch(SAG_S))?;
+    /// Starts at rest and brings the shaft up to speed, without torque or by the drive's regulation.
+    fn up_to_speed(&mut self) -> Result<(), Error> {
+        self.bench.start();
+        if self.case.shaft(self.rpm) != Shaft::Free {
+            return self.bench.bring_up();
         }
+        self.bench.follow(&[Part::constant(self.rpm, self.ramp_s() + 1.5)])
+    }
+
+    /// Time of the ramp to the speed of the run, s.
+    fn ramp_s(&self) -> f64 {
+        let config = self.bench.config;
+        config.rpm(self.rpm.abs()) / f64::from(config.drive.ramp_rpm_per_s())
+    }
+
+    /// Returns the parts of a run that consists of nothing else.
+    fn parts(&self) -> Vec<Part> {
+        let (rpm, i_q, config) = (self.rpm, self.i_q, self.bench.config);
+        let at = |value: f64, seconds| Part::constant(value, seconds);
+        match self.case.kind {
+            RangeKind::Reversals => {
+                let step = self.sign * STEP_A.min(nominal_limit_a(config) / config.amperes(1.0));
+                [step, -step, step, 0.0, -step].map(|a| at(a, 0.6)).to_vec()
+            }
+            RangeKind::LoadSteps => {
+                let nm = self.sign * LOAD_NM;
+                let loaded = |nm| Part { load_nm: config.newton_metres(nm), ..at(rpm, 1.0) };
+                [nm, 0.0, -nm, 0.0].map(loaded).to_vec()
+            }
+            RangeKind::Ramps | RangeKind::HotRamps => {
+                // Through zero and back, with or without warming of the motor on the way.
+                let once = self.ramp_s();
+                let warming = Part::unchanged(Change::Warming(RISE.0, RISE.1), WARMING_S);
+                let warms = (self.case.kind == RangeKind::HotRamps).then_some(warming);
+                let back = [at(-rpm, 2.0 * once + 0.7), at(0.0, once + 1.0)];
+                [at(rpm, once + 0.7)].into_iter().chain(warms).chain(back).collect()
+            }
+            RangeKind::TurnedFlux => {
+                let change = Change::Flux(self.turn_deg);
+                vec![at(i_q, 1.0), Part { change, ..at(i_q, 3.0) }]
+            }
+            RangeKind::Outage => {
+                let mains = |volts, s| Part { change: Change::Mains(volts), ..at(rpm, s) };
+                vec![mains(0.0, OUTAGE_S), mains(config.inverter.dc_link_v, 2.0)]
+            }
+            RangeKind::Sag => {
+                // The voltage of a stiff dc link falls and returns under torque.
+                let sag = |from, to| Part::unchanged(Change::DcLink(Ramp(from, to)), SAG_RAMP_S);
+                let held = Part::unchanged(Change::Nothing, SAG_S);
+                vec![at(i_q, 1.0), sag(1.0, SAG), held, sag(SAG, 1.0), held]
+            }
+            _ => vec![at(i_q, 3.5)],
+        }
+    }
+
+    /// Starts while a dynamometer turns the shaft, then commands torque.
+    fn turning_start(&mut self) -> Result<(), Error> {
+        let bench = &mut self.bench;
+        let speed = bench.config.rpm(self.rpm) * TAU / 60.0;
+        bench.rig.set_load(Load::Speed { speed })?;
+        let from = bench.time();
+        bench.trial.peak_a = 0.0;
+        bench.start();
+        // The error of the first samples belongs to the search for the flux.
+        let before = bench.trial.largest_deg;
+        loop {
+            bench.watch(1.0 / 600.0);
+            if !bench.has_ended && bench.error_deg.abs() < CAUGHT_DEG {
+                break;
+            }
+            if bench.has_ended || bench.time() - from > LONGEST_CATCH_S {
+                return Ok(());
+            }
+        }
+        bench.trial.largest_deg = before;
+        bench.trial.took_s = Some(bench.time() - from);
+        bench.count_after(0.1);
+        bench.follow(&[Part::constant(self.sign * CAUGHT_A, 0.7)])
+    }
+
+    /// Brakes from full speed to standstill.
+    fn braking(&mut self) -> Result<(), Error> {
+        let bench = &mut self.bench;
+        let from = bench.time();
+        bench.count_after(0.0);
+        let stopped = bench.config.rpm(STOPPED_RPM) * TAU / 60.0;
+        while bench.rig.plant.mechanical_speed().abs() > stopped {
+            bench.follow(&[Part::constant(0.0, 0.02)])?;
+            if bench.has_ended || bench.time() - from > LONGEST_STOP_S {
+                return Ok(());
+            }
+        }
+        bench.trial.took_s = Some(bench.time() - from);
         Ok(())
     }
 }

@@ -1,0 +1,84 @@
+//! A run over time: its parts one after the other, what changes in them, and the shaft. The bench of the stress test runs it.
+
+/// A value at the beginning and at the end of a part, with a straight line between them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ramp(pub f64, pub f64);
+
+impl Ramp {
+    /// Returns the value after this many of all steps.
+    pub fn after(self, n: f64, steps: f64) -> f64 {
+        self.0 + (self.1 - self.0) * n / steps
+    }
+}
+
+/// What changes in a part beside the reference and the load.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Change {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The rotor flux is suddenly rotated at the beginning, by this many electrical degrees.
+    Flux(f64),
+    /// The mains have this peak voltage from the beginning, V.
+    Mains(f64),
+    /// Speed of the dynamometer, rpm.
+    Shaft(Ramp),
+    /// Voltage of a stiff dc link, relative to the nominal one.
+    DcLink(Ramp),
+    /// The resistances of stator and rotor rise by these shares.
+    Warming(f64, f64),
+}
+
+/// A part of a run. Currents and speeds are for the dissertation's motor; on others they are in proportion, q-axis
+/// currents to the [nominal limit](super::battery::nominal_limit_a).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// q-axis current, A, or speed, rpm. None: unchanged.
+    pub reference: Option<Ramp>,
+    /// Torque of the load on the motor of the run, Nm, if the shaft is free.
+    pub load_nm: f64,
+    /// What else changes.
+    pub change: Change,
+    /// Duration, s.
+    pub seconds: f64,
+}
+
+impl Part {
+    /// Makes a part with a constant reference.
+    pub fn constant(reference: f64, seconds: f64) -> Self {
+        Self::ramp(Ramp(reference, reference), seconds)
+    }
+
+    /// Makes a part with a reference that changes.
+    pub fn ramp(reference: Ramp, seconds: f64) -> Self {
+        Self { reference: Some(reference), ..Self::unchanged(Change::Nothing, seconds) }
+    }
+
+    /// Makes a part in which the reference stays as it is.
+    pub fn unchanged(change: Change, seconds: f64) -> Self {
+        Self { reference: None, load_nm: 0.0, change, seconds }
+    }
+
+    /// Returns the number of steps in which its values change.
+    pub fn steps(&self) -> u32 {
+        let pace_s = match self.change {
+            Change::Shaft(_) => 0.01,
+            Change::DcLink(_) => 0.01 / 60.0,
+            Change::Warming(..) => 0.03,
+            _ if self.reference.is_some_and(|ramp| ramp.0 != ramp.1) => 0.01,
+            _ => return 1,
+        };
+        (self.seconds / pace_s).round() as u32
+    }
+}
+
+/// The shaft in a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shaft {
+    /// The shaft is locked.
+    Locked,
+    /// A dynamometer holds a speed, rpm.
+    Held(f64),
+    /// The shaft is free; the drive regulates its speed.
+    Free,
+}
