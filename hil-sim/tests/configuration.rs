@@ -63,41 +63,6 @@ fn just_outside_the_range_is_refused() {
 }
 
 #[test]
-fn errors_name_the_key_the_value_and_the_range() {
-    let text = |assignment: &str| Config::load(None, None, &[assignment]).unwrap_err().to_string();
-    assert_eq!(text("motor.r_s=-1"), "motor.r_s = -1: out of range; allowed: 0.0001 to 1000 ohm");
-    assert_eq!(
-        text("motor.r_s=nan"),
-        "motor.r_s = NaN: not a finite number; allowed: 0.0001 to 1000 ohm"
-    );
-    assert_eq!(
-        text("motor.r_s=a lot"),
-        "motor.r_s = a lot: not a number; allowed: 0.0001 to 1000 ohm"
-    );
-    assert_eq!(
-        text("motor.pole_pairs=1.5"),
-        "motor.pole_pairs = 1.5: not a whole number; allowed: 1 to 6"
-    );
-    assert_eq!(
-        text("angle_source=resolver"),
-        "angle_source = resolver: not one of the words; allowed: encoder, injection"
-    );
-    assert_eq!(
-        text("motor.r_x=5"),
-        "there is no key `motor.r_x`; did you mean `motor.r_r`?; `keys` shows all of them"
-    );
-    assert_eq!(text("motor.r_s"), "`motor.r_s`: write KEY=VALUE, for example --set motor.r_s=5.4");
-    assert_eq!(
-        text("sequence.i_d=much"),
-        "sequence.i_d = much: neither a finite number nor auto; allowed: 0.01 to 3.5 A, or auto"
-    );
-    assert_eq!(
-        text("drive.load.mode=free"),
-        "there is no key `drive.load.mode`; `keys` shows all of them"
-    );
-}
-
-#[test]
 fn toml_and_assignments_say_the_same() {
     let mut from_toml = Config::default();
     let table = "runs = 3\nload.mode = \"speed\"\n[motor]\nr_s = 6\n[drive.motor]\nr_r = 1.3\n";

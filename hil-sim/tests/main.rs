@@ -1,6 +1,5 @@
 //! The tests of the simulator: one program, with one module for each subject.
 
-mod after_step;
 mod battery;
 mod bench_tests;
 mod board_builds;
