@@ -1,84 +1,19 @@
-//! A user's motor, for which a file states nameplate, circuit and dc link: it works at the first attempt.
+//! A user's motor, for which a file states nameplate, circuit and dc link: its rules, its refusals, and the example of the page. That it
+//! works at the first attempt is in `bounds.toml`.
 
 use std::path::Path;
 
 use crate::cli_common::{folder, hil_sim, text};
 use drive_settings::PlantSource;
+use hil_sim::Config;
 use hil_sim::config::motors::Motor;
-use hil_sim::{Config, experiments};
 
-/// 1.5 kW, 400 V, 50 Hz, 4 poles, of efficiency class IE2, on 560 V.
-const LARGE: &str = "
-[nameplate]
-power_w = 1500
-voltage_v = 400
-current_a = 3.4
-frequency_hz = 50
-speed_rpm = 1435
-[motor]
-r_s = 4.6
-r_r = 3.3
-l_ls = 0.0135
-l_lr = 0.0135
-l_m = 0.33
-pole_pairs = 2
-[inverter]
-dc_link_v = 560
-";
-
-/// 250 W, wound for 48 V dc.
-const SMALL: &str = "
-[nameplate]
-power_w = 250
-voltage_v = 32
-current_a = 8
-frequency_hz = 50
-speed_rpm = 1400
-[motor]
-r_s = 0.22
-r_r = 0.13
-l_ls = 0.0008
-l_lr = 0.0008
-l_m = 0.009
-pole_pairs = 2
-[inverter]
-dc_link_v = 48
-";
+const LARGE: &str = include_str!("own-motor/large.toml");
 
 fn written(folder: &Path, name: &str, text: &str) -> String {
     let path = folder.join(name);
     std::fs::write(&path, text).expect("a file");
     path.to_str().expect("a path of letters").to_owned()
-}
-
-/// Neither motor is lost or stopped.
-fn nameplate_and_circuit(seeds: u64) {
-    let folder = folder("own-motor");
-    for (name, text) in [("large.toml", LARGE), ("small.toml", SMALL)] {
-        let motor = written(&folder, name, text);
-        let config = Config::of_motor(Some(&motor)).expect("a motor");
-        for experiment in ["torque-steps", "speed-profile"] {
-            for seed in 1..=seeds {
-                let outcome = experiments::run(experiment, &config, seed);
-                let outcome = outcome.unwrap_or_else(|e| panic!("{name} {experiment} {seed}: {e}"));
-                let largest = outcome.metrics.get("angle_error_max_deg").expect("an angle");
-                println!("{name} {experiment} {seed}: {largest:.1}");
-                let lost = outcome.lost();
-                assert!(lost.is_none() && largest < 45.0, "{name} {experiment} {seed}: {lost:?}");
-            }
-        }
-    }
-}
-
-#[test]
-fn nameplate_and_circuit_are_enough() {
-    nameplate_and_circuit(3);
-}
-
-#[test]
-#[ignore = "cargo xtask prove long-tests"]
-fn nameplate_and_circuit_are_enough_with_eight_seeds() {
-    nameplate_and_circuit(8);
 }
 
 /// The sensors of the dissertation's bench reach 1.24 times the rated current of its motor, and so do those of a user's

@@ -58,7 +58,7 @@ fn names(program: &Path) -> Vec<String> {
 }
 
 /// Returns the first difference of two values, with both values.
-fn difference(at: &str, now: &Value, then: &Value) -> Option<String> {
+pub fn difference(at: &str, now: &Value, then: &Value) -> Option<String> {
     match (now, then) {
         (Value::Object(now), Value::Object(then)) => {
             now.keys().chain(then.keys()).find_map(|key| {

@@ -13,6 +13,10 @@ use std::path::Path;
 use std::process::Command;
 use std::{env, fs};
 
+use serde_json::Value;
+
+use crate::same_json::difference;
+
 const HIGH_FLUX: [&str; 6] =
     ["--set", "flux_level=high", "--set", "sequence.flux=high", "--set", "prepare.learn=yes"];
 
@@ -38,31 +42,19 @@ fn runs() -> Vec<(String, Vec<String>)> {
 fn statistics_are_as_recorded() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recorded");
     let writes = env::var("YARDSTICK").is_ok_and(|value| value == "write");
+    let mut differ = Vec::new();
     for (name, arguments) in runs() {
         let mut command = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
         let output = command.args(["run", "--json", "--quiet"]).args(&arguments).output().unwrap();
-        let text = String::from_utf8(output.stdout).unwrap();
-        assert!(text.len() > 500, "{name}: {}", String::from_utf8_lossy(&output.stderr));
-        let file = folder.join(format!("{name}.json"));
-        if writes {
-            fs::write(&file, &text).unwrap();
-        }
-        // Not `assert_eq`, because the texts are long.
-        let recorded = fs::read_to_string(&file).unwrap();
-        let differs = text.bytes().zip(recorded.bytes()).position(|(now, then)| now != then);
-        let near = |text: &str, at: usize| {
-            String::from_utf8_lossy(
-                &text.as_bytes()[at.saturating_sub(80)..text.len().min(at + 40)],
-            )
-            .into_owned()
+        let object = |text: &[u8]| -> Value {
+            let error = String::from_utf8_lossy(&output.stderr);
+            serde_json::from_slice(text).unwrap_or_else(|why| panic!("{name}: {why}: {error}"))
         };
-        if let Some(at) = differs {
-            panic!(
-                "{name}, at byte {at}:\n{}\ninstead of\n{}",
-                near(&text, at),
-                near(&recorded, at)
-            );
+        let (file, now) = (folder.join(format!("{name}.json")), object(&output.stdout));
+        if writes {
+            fs::write(&file, &output.stdout).unwrap();
         }
-        assert_eq!(text.len(), recorded.len(), "{name}");
+        differ.extend(difference(&name, &now, &object(&fs::read(&file).unwrap())));
     }
+    assert!(differ.is_empty(), "{}", differ.join("\n"));
 }

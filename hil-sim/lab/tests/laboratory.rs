@@ -7,18 +7,16 @@ use drive_core::table::{Grid, POINTS, ReferenceTable};
 use drive_settings::Settings;
 use drive_settings::tuning::rule_3_8;
 use sim_bench::Config;
-use sim_bench::Context;
 use sim_bench::plant::{MachineSettings, MechanicsSettings};
-use sim_bench::progress::Progress;
 use sim_bench::rig::Rig;
 use sim_lab::angle_identification::measure::{Record, SLOW, steps};
 use sim_lab::angle_identification::model::{Model, Pii};
 use sim_lab::identification::Complex;
 use sim_lab::identification::signals::{Filter, Prbs, schroeder, six_step};
 use sim_lab::linear_model::{Disturbance, LinearModel};
+use sim_lab::pi_design;
 use sim_lab::poles::largest_pole;
 use sim_lab::recomputed::{PERIOD_S, plant};
-use sim_lab::{filters, modulation, pi_design};
 
 #[test]
 fn a_known_plant_is_found_and_stabilised() {
@@ -166,43 +164,4 @@ fn the_filter_has_its_corner() {
         gain = filter.step(Complex::from_polar(1.0, omega * h * f64::from(n))).norm();
     }
     assert!((gain - 0.5f64.powf(1.5)).abs() < 1e-3, "{gain}");
-}
-
-/// Sections in single precision are as good as exact; the direct form is useless. The test uses a tenth of the samples
-/// of the experiment; `seconds` takes more.
-#[test]
-fn filters_in_single_precision() {
-    let config = Config::default();
-    let context = Context {
-        config: &config,
-        seed: 1,
-        seconds: Some(10.0),
-        progress: Progress::hidden(),
-        file: None,
-    };
-    let outcome = filters::run(&context).unwrap();
-    let metric = |name: &str| outcome.metrics.get(name).unwrap();
-    for filter in ["lpf", "bpf", "pp"] {
-        assert!(metric(&format!("{filter}_sections_error_rms_a")) <= 2e-5, "{filter}");
-        assert!(metric(&format!("{filter}_sections_error_max_a")) <= 1e-4, "{filter}");
-    }
-    for filter in ["lpf", "pp"] {
-        for form in ["direct_1", "direct_2", "transposed_2"] {
-            assert!(metric(&format!("{filter}_{form}_error_rms_a")) >= 0.8e-3, "{filter} {form}");
-        }
-    }
-    assert!(metric("lpf_gain_600hz_db") <= -48.0);
-    for (filter, gain) in [("lpf", 0.94406), ("bpf", 0.01), ("pp", 0.94406)] {
-        assert!((metric(&format!("{filter}_dc_gain")) - gain).abs() < 1e-4, "{filter}");
-    }
-}
-
-#[test]
-fn the_modulator_gives_the_voltage_asked_for() {
-    let outcome =
-        modulation::run(&Context::new(&Config::default(), 1, Progress::hidden())).unwrap();
-    let metric = |name: &str| outcome.metrics.get(name).unwrap();
-    assert!(metric("voltage_error_max_v") < 0.05);
-    assert!(metric("on_time_difference_max_us") < 0.03);
-    assert!((metric("sideband_over_signal") - 0.5).abs() < 1e-6);
 }
