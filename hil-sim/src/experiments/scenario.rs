@@ -11,7 +11,8 @@ pub use file::{Metric, Statistic};
 pub use quantity::{QUANTITIES, Seen};
 pub use record::Record;
 
-use self::file::{Ramp, Text};
+use self::file::Text;
+use super::course::Ramp;
 use crate::prelude::*;
 
 /// The scenarios of the program by the names of their experiments.

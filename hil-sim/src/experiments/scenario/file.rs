@@ -7,11 +7,8 @@ use super::{Part, REFERENCES, Reference, Scenario, Shaft};
 use crate::columns::Columns;
 use crate::config::{Value, flattened};
 use crate::error::{cut, parser_text, unknown};
+use crate::experiments::course::Ramp;
 use crate::prelude::*;
-
-/// A value at the beginning and at the end of a part, with a straight line between them.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Ramp(pub f64, pub f64);
 
 impl Ramp {
     /// Reads a number, or two in a list.
