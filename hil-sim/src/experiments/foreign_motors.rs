@@ -336,10 +336,7 @@ impl Study for ForeignMotors {
                     "carrier (% of the dc link)",
                     Cell::fixed_or_dash(record.ratios.map(|it| it.1), 1),
                 ),
-                (
-                    "rms (°)",
-                    Cell::fixed_or_dash(Some(record.rms()).filter(|rms| rms.is_finite()), 2),
-                ),
+                ("rms (°)", Cell::fixed_or_dash(record.rms(), 2)),
                 ("what", Cell::from(told.join("; "))),
             ]);
         }

@@ -182,11 +182,6 @@ impl Mean {
     }
 }
 
-/// Returns a number, or a dash if it is not known.
-fn known(value: f64, decimals: usize) -> Cell {
-    Cell::fixed_or_dash((!value.is_nan()).then_some(value), decimals)
-}
-
 fn rated_rpm(config: &Config) -> f64 {
     f64::from(config.drive.nameplate.speed_rpm)
 }
@@ -223,16 +218,16 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let columns = columns![|_, pair: &(&Case, &[Response; 2])|
         "shaft" => Cell::from(pair.0.name());
         "speed (rpm)" => Cell::fixed(pair.0.speed * rated_rpm, 0);
-        "load (%)" => known(100.0 * pair.1[0].load, 0);
-        "speed falls by (rpm)" => known(pair.1[0].dip_rpm, 1);
-        "with an encoder (rpm)" => known(pair.1[1].dip_rpm, 1);
-        "bound (rpm)" => known(bound_rpm(pair), 1);
-        "area (%s)" => known(pair.1[0].area_pct_s, 2);
-        "with an encoder (%s)" => known(pair.1[1].area_pct_s, 2);
-        "back within 2 % (s)" => known(pair.1[0].recovery_s, 2);
-        "torque noise before (%)" => known(pair.1[0].noise_pct[0], 2);
-        "after (%)" => known(pair.1[0].noise_pct[1], 2);
-        "largest angle error (°)" => known(pair.1[0].angle_deg, 1);
+        "load (%)" => Cell::fixed_or_dash(100.0 * pair.1[0].load, 0);
+        "speed falls by (rpm)" => Cell::fixed_or_dash(pair.1[0].dip_rpm, 1);
+        "with an encoder (rpm)" => Cell::fixed_or_dash(pair.1[1].dip_rpm, 1);
+        "bound (rpm)" => Cell::fixed_or_dash(bound_rpm(pair), 1);
+        "area (%s)" => Cell::fixed_or_dash(pair.1[0].area_pct_s, 2);
+        "with an encoder (%s)" => Cell::fixed_or_dash(pair.1[1].area_pct_s, 2);
+        "back within 2 % (s)" => Cell::fixed_or_dash(pair.1[0].recovery_s, 2);
+        "torque noise before (%)" => Cell::fixed_or_dash(pair.1[0].noise_pct[0], 2);
+        "after (%)" => Cell::fixed_or_dash(pair.1[0].noise_pct[1], 2);
+        "largest angle error (°)" => Cell::fixed_or_dash(pair.1[0].angle_deg, 1);
         "ends" => Cell::from(pair.1[0].end());
         "with an encoder" => Cell::from(pair.1[1].end());
     ];

@@ -133,9 +133,10 @@ impl Cell {
         cell.unwrap_or_else(|| "-".into())
     }
 
-    /// Returns a number with this many decimals, or a dash if there is none.
-    pub fn fixed_or_dash(value: Option<f64>, decimals: usize) -> Self {
-        Self::or_dash(value.map(|value| Self::fixed(value, decimals)))
+    /// Returns a number with this many decimals, or a dash if there is none, or if it is not finite.
+    pub fn fixed_or_dash(value: impl Into<Option<f64>>, decimals: usize) -> Self {
+        let finite = value.into().filter(|value| value.is_finite());
+        Self::or_dash(finite.map(|value| Self::fixed(value, decimals)))
     }
 
     /// Returns a number with this many decimals.

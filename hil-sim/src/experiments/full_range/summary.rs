@@ -65,7 +65,7 @@ pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
         verdict.swap(8, 9);
         let cell = |value: f64, decimals: Option<usize>| match decimals {
             None => Cell::from(value.to_string()),
-            Some(decimals) => Cell::fixed_or_dash(value.is_finite().then_some(value), decimals),
+            Some(decimals) => Cell::fixed_or_dash(value, decimals),
         };
         let cells = verdict.into_iter().map(|(_, head, value, digits)| (head, cell(value, digits)));
         table.record([("kind", Cell::from(case.words()))].into_iter().chain(cells));
