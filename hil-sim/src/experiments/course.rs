@@ -46,12 +46,8 @@ pub struct Part {
 impl Part {
     /// Makes a part with a constant reference.
     pub fn constant(reference: f64, seconds: f64) -> Self {
-        Self::ramp(Ramp(reference, reference), seconds)
-    }
-
-    /// Makes a part with a reference that changes.
-    pub fn ramp(reference: Ramp, seconds: f64) -> Self {
-        Self { reference: Some(reference), ..Self::unchanged(Change::Nothing, seconds) }
+        let reference = Some(Ramp(reference, reference));
+        Self { reference, ..Self::unchanged(Change::Nothing, seconds) }
     }
 
     /// Makes a part in which the reference stays as it is.

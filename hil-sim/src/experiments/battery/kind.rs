@@ -186,7 +186,8 @@ impl Kind {
                 .collect(),
             Self::Ramp => {
                 let ramp = Ramp(-sign * MOST_A, sign * MOST_A);
-                vec![Part::constant(ramp.0, LEVEL_S), Part::ramp(ramp, 3.0)]
+                let reversal = Part { reference: Some(ramp), ..Part::constant(0.0, 3.0) };
+                vec![Part::constant(ramp.0, LEVEL_S), reversal]
             }
             Self::Speed(rpm) => {
                 vec![Part::constant(rpm.into(), 2.0), Part::constant(-f64::from(rpm), 2.0)]

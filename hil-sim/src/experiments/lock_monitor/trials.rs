@@ -13,11 +13,6 @@ const IQ_A: (f64, f64) = (0.5, 3.0);
 /// Time for which a trial is watched after the angle was forced off, s.
 const WATCH_S: f64 = 2.0;
 
-/// Returns the fault with which the drive stopped itself, if it did.
-pub fn fault(rig: &Rig) -> Option<Fault> {
-    rig.drive.state().fault()
-}
-
 /// Returns a random operating point with a speed within ±`bound` rpm.
 pub fn case(seed: u64, bound: f64) -> OperatingPoint {
     let mut random = seeded(seed);
@@ -75,14 +70,14 @@ pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Tri
     let mut random = seeded(case.seed ^ 0x5eed);
     let mut rig = at_speed(config, case)?;
     rig.wait(0.8 + random.random_range(0.0..0.2));
-    if let Some(fault) = fault(&rig) {
+    if let Some(fault) = rig.drive.state().fault() {
         let (seed, fault) = (case.seed, fault.code());
         let why = format!("seed {seed}: fault {fault} before the angle was forced off");
         return Err(Error::Refused(why));
     }
     rig.plant.turn_rotor_flux(degrees.to_radians());
     let (start, mut wrong_s, mut loss) = (rig.time(), 0.0, Vec::new());
-    while rig.time() < start + WATCH_S && fault(&rig).is_none() {
+    while rig.time() < start + WATCH_S && rig.fault().is_none() {
         // One period of the injection: the drive itself acts no more often.
         rig.run(1.0 / 600.0, |p| {
             if p.angle_error_deg.abs() >= LOCKED_DEG {
@@ -93,7 +88,7 @@ pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Tri
     }
     loss.truncate(loss.len() - loss.len() % 10);
     let loss = loss.chunks(10).map(|c| c[9]).collect();
-    Ok(Trial { case, wrong_s, fault: fault(&rig), loss, ..Trial::default() })
+    Ok(Trial { case, wrong_s, fault: rig.drive.state().fault(), loss, ..Trial::default() })
 }
 
 words! {
@@ -127,13 +122,13 @@ pub fn healthy(config: &Config, seed: u64, kind: HealthyKind) -> Result<Trial, E
     } else {
         let mut rig = at_speed(config, case)?;
         rig.run(1.3, &mut look);
-        if kind == HealthyKind::Reversal && fault(&rig).is_none() {
+        if kind == HealthyKind::Reversal && rig.fault().is_none() {
             rig.command(&Command::Torque(-case.iq as f32))?;
         }
         rig
     };
     rig.run(1.0, &mut look);
-    result.fault = fault(&rig);
+    result.fault = rig.drive.state().fault();
     Ok(result)
 }
 
@@ -156,7 +151,7 @@ fn load_step(
     rig.set_load(Load::Free { torque: 0.0 })?;
     let pace = 1.0 / 600.0;
     for n in 0..1380 {
-        if fault(&rig).is_some() {
+        if rig.fault().is_some() {
             break;
         }
         if n == 600 {
@@ -189,13 +184,13 @@ pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<Trial, Error
     let mut rig = at_speed(config, case)?;
     rig.wait(0.5);
     let (mut rpm, mut late_s) = (case.rpm.abs(), 0.0);
-    while fault(&rig).is_none() && late_s < OVER_SPEED_S {
+    while rig.fault().is_none() && late_s < OVER_SPEED_S {
         rpm += rpm_per_s * 0.001;
         rig.set_load(Load::Speed { speed: rpm.copysign(case.rpm) * TAU / 60.0 })?;
         rig.wait(0.001);
         late_s = (rpm - limit) / rpm_per_s;
     }
-    Ok(Trial { case, rpm_per_s, late_s, fault: fault(&rig), ..Trial::default() })
+    Ok(Trial { case, rpm_per_s, late_s, fault: rig.drive.state().fault(), ..Trial::default() })
 }
 
 /// Starts a drive, or relocks a running one, at `rpm`.
@@ -222,15 +217,15 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Trial
         config.load.speed_rpm = rpm;
         let mut rig = Rig::from_config(&config, seed)?;
         let started = rig.start(Mode::Torque);
-        if fault(&rig).is_none() {
+        if rig.fault().is_none() {
             started?;
         }
         rig
     };
-    if fault(&rig).is_none() {
+    if rig.fault().is_none() {
         rig.run(0.5, |p| result.largest_deg = result.largest_deg.max(p.angle_error_deg.abs()));
         // A drive that stops itself within this time has not accepted the start.
-        result.accepted = fault(&rig).is_none();
+        result.accepted = rig.fault().is_none();
     }
     Ok(result)
 }
