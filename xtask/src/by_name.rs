@@ -14,8 +14,11 @@ const PAGES: [&str; 4] =
 /// The client of the field bus from PyPI.
 const PYMODBUS: &str = "pymodbus>=3.10,<4";
 
-/// Makes pages of the simulator in `target/pages`, measures them in Chromium, and drives the live page on the virtual board.
+/// Compares numbers and pictures of the theory with its script; makes pages of the simulator in `target/pages`, measures them in Chromium, and
+/// drives the live page on the virtual board.
 pub fn pages() -> Result<()> {
+    let script = ["docs/pictures/theory.py", "--check"];
+    run::step("theory", run::command("python3").args(script))?;
     toolchain::ensure_chromium()?;
     toolchain::ensure_c_compiler()?;
     let folder = run::folder("pages")?;
