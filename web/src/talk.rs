@@ -29,13 +29,6 @@ pub fn hello(version: Option<&String>, described: &[Value], misfit: Option<Strin
     json!({ "hello": { "version": version, "program": program, "signals": signals, "misfit": misfit } })
 }
 
-fn words(frame: &Frame) -> impl Iterator<Item = u8> + use<> {
-    let mut values = [f32::NAN; MOST_SIGNALS];
-    values.iter_mut().zip(&frame.values).for_each(|(place, value)| *place = *value);
-    let head = [frame.period, frame.sequence.into()];
-    head.into_iter().chain(values.map(f32::to_bits)).flat_map(u32::to_le_bytes)
-}
-
 /// Most frames that wait for a slow page; the oldest are dropped first.
 const MOST_FRAMES: usize = 6000;
 
@@ -65,7 +58,16 @@ impl Frames {
 
     /// Returns the waiting frames, each as ten little-endian words: period, sequence number, values.
     pub fn take(&mut self) -> Vec<u8> {
-        self.waiting.drain(..).flat_map(|frame| words(&frame)).collect()
+        let mut bytes = Vec::new();
+        for frame in self.waiting.drain(..) {
+            let mut values = [f32::NAN; MOST_SIGNALS];
+            values.iter_mut().zip(&frame.values).for_each(|(place, value)| *place = *value);
+            let head = [frame.period, frame.sequence.into()];
+            for word in head.into_iter().chain(values.map(f32::to_bits)) {
+                bytes.extend(word.to_le_bytes());
+            }
+        }
+        bytes
     }
 }
 
