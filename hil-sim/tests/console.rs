@@ -197,14 +197,27 @@ fn the_drive_lists_what_can_be_completed() {
     assert_eq!(catalogue.complete("sta").1, ["status"]);
 }
 
+/// The port closes, or another line ends the list.
 #[test]
-fn a_closed_port_ends_the_wait() {
-    let (ours, theirs) = UnixStream::pair().unwrap();
-    let mut link = Link::new(theirs.try_clone().unwrap(), theirs, |_: &str| ());
-    std::thread::spawn(move || {
-        let mut ours = ours;
-        let _ = ours.read(&mut [0; 8]);
-    });
-    assert!(matches!(link.ask("status", |_| ()), Err(LinkError::Closed)));
-    assert!(matches!(link.ask("status", |_| ()), Err(LinkError::Closed)));
+fn an_answer_that_cannot_be_whole_ends_the_wait() {
+    for said in ["", "a  b\r\n@2 ok\r\n"] {
+        let (mut ours, theirs) = UnixStream::pair().unwrap();
+        let (show, shown) = std::sync::mpsc::channel();
+        let show = move |line: &str| drop(show.send(line.to_owned()));
+        let mut link = Link::new(theirs.try_clone().unwrap(), theirs, show);
+        std::thread::spawn(move || {
+            let _ = ours.read(&mut [0; 8]);
+            ours.write_all(said.as_bytes()).unwrap();
+        });
+        match link.ask("help", |_| ()) {
+            Err(LinkError::Cut(line)) => {
+                assert_eq!((line.as_str(), shown.recv().unwrap().as_str()), ("help", "ok"));
+            }
+            Err(LinkError::Closed) => {
+                assert!(said.is_empty());
+                assert!(matches!(link.ask("status", |_| ()), Err(LinkError::Closed)));
+            }
+            other => panic!("{said:?}: {other:?}"),
+        }
+    }
 }

@@ -4,8 +4,9 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use drive_stream::client::Answer;
 use drive_web::{loops, talk};
-use hil_sim::console::link::{Answer, Link, LinkError};
+use hil_sim::console::link::{Link, LinkError};
 use serde_json::{Value, json};
 
 use crate::shared::{Ask, Shared};
@@ -105,7 +106,7 @@ fn converse(shared: &Shared, link: &mut Link) {
         if asked.elapsed() >= STATUS {
             asked = Instant::now();
             match link.ask("status", |_| ()) {
-                Ok(mut answer) => show_status(shared, &answer.lines.pop().unwrap_or_default()),
+                Ok(answer) => show_status(shared, answer.last()),
                 // The drive was reset, or has another rate: the caller connects again.
                 Err(LinkError::Silence(..)) => return,
                 Err(_) => {}

@@ -17,6 +17,33 @@ pub const UNASKED: &str = "* ";
 /// Longest line that is assembled.
 const LONGEST: usize = 4096;
 
+/// The answer to a request.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Answer {
+    /// The lines of the answer, the last one without its tag.
+    pub lines: Vec<String>,
+}
+
+impl Answer {
+    /// Returns the last line.
+    pub fn last(&self) -> &str {
+        self.lines.last().map_or("", String::as_str)
+    }
+
+    /// Returns the line that refuses the request.
+    pub fn error(&self) -> Option<&str> {
+        Some(self.last()).filter(|line| is_error(line))
+    }
+
+    /// Returns the lines without an `ok` at the end.
+    pub fn contents(&self) -> &[String] {
+        match self.lines.split_last() {
+            Some((last, before)) if last == "ok" => before,
+            _ => &self.lines,
+        }
+    }
+}
+
 /// Something that the drive has sent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
@@ -24,8 +51,8 @@ pub enum Event {
     Frame(Option<Frame>),
     /// A line of the awaited answer; others follow.
     Line(String),
-    /// The last line of the awaited answer, without its tag.
-    Last(String),
+    /// The whole awaited answer.
+    Answer(Answer),
     /// The answer to a later request, which has cut the awaited answer short.
     Cut(String),
     /// An unsolicited line, or the answer to a request that is not awaited.
@@ -41,8 +68,9 @@ pub struct Client {
     in_sequence: bool,
     /// Tag of the last request.
     tag: u32,
-    /// The request that is awaited: its tag, and the line as it was sent.
+    /// The request that is awaited: its tag, and the line as it was sent. The next field holds its answer so far.
     awaited: Option<(u32, String)>,
+    answer: Answer,
 }
 
 impl Client {
@@ -50,6 +78,7 @@ impl Client {
     pub fn ask(&mut self, request: &str) -> String {
         let line = self.send(request);
         self.awaited = Some((self.tag, line.clone()));
+        self.answer.lines.clear();
         line
     }
 
@@ -105,18 +134,23 @@ impl Client {
             .and_then(|(tag, rest)| Some((u32::from_str_radix(tag, 16).ok()?, rest)));
         let text = known.map_or(line, |(_, text)| text).to_owned();
         let Some((awaited, sent)) = &self.awaited else { return Some(Event::Unasked(text)) };
-        let is_echo = line.starts_with('@') && sent.starts_with(line);
         let event = match known {
-            _ if is_echo => return None,
+            _ if sent.starts_with(line) => return None,
             _ if line.starts_with(UNASKED) => return Some(Event::Unasked(text)),
-            None if !is_error(line) => return Some(Event::Line(text)),
+            None if !is_error(line) => {
+                self.answer.lines.push(text.clone());
+                return Some(Event::Line(text));
+            }
             Some((tag, _)) if tag != *awaited => {
                 if awaited.wrapping_sub(tag) < 1 << 31 {
                     return Some(Event::Unasked(text));
                 }
                 Event::Cut(text)
             }
-            _ => Event::Last(text),
+            _ => {
+                self.answer.lines.push(text);
+                Event::Answer(core::mem::take(&mut self.answer))
+            }
         };
         self.awaited = None;
         Some(event)
@@ -129,13 +163,13 @@ pub fn split_tag(line: &str) -> Option<(&str, &str)> {
 }
 
 /// Whether a line refuses a request.
-pub fn is_error(line: &str) -> bool {
+fn is_error(line: &str) -> bool {
     line.starts_with("error:")
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Event::{Cut, Last, Line, Unasked};
+    use super::Event::{Cut, Line, Unasked};
     use super::*;
 
     /// A client that awaits the answer to this request with this tag.
@@ -145,37 +179,78 @@ mod tests {
         client
     }
 
-    fn heard(mut client: Client, line: &str) -> Option<Event> {
-        line.bytes().chain(*b"\r\n").find_map(|byte| client.push(byte))
+    /// Events of lines, in words.
+    fn heard(client: &mut Client, lines: &[&str]) -> Vec<String> {
+        let bytes = lines.iter().flat_map(|line| line.bytes().chain(*b"\r\n"));
+        let events = bytes.filter_map(|byte| client.push(byte));
+        let words = events.map(|event| match event {
+            Line(line) => format!("line {line}"),
+            Event::Answer(answer) => format!("answer {}", answer.lines.join("|")),
+            Cut(line) => format!("cut {line}"),
+            Unasked(line) => format!("unasked {line}"),
+            Event::Frame(_) => "frame".to_owned(),
+        });
+        words.collect()
     }
 
     #[test]
     fn each_line_has_one_meaning() {
-        let text = |event: fn(String) -> Event, text: &str| Some(event(text.to_owned()));
         for (line, expected) in [
-            ("@1f faults 4", None),
-            ("@1f faul", None),
-            ("", None),
-            (
-                "* fault 4: dc link; likely: the brake; type 'clear'",
-                text(Unasked, "* fault 4: dc link; likely: the brake; type 'clear'"),
-            ),
-            ("fault 4: dc link", text(Line, "fault 4: dc link")),
-            ("\x1b[Kcause 1: 25 °C \x07", text(Line, "cause 1: 25 °C")),
-            ("ok", text(Line, "ok")),
-            ("@1f ok: limited to 3.4 A", text(Last, "ok: limited to 3.4 A")),
-            ("@1f error: no such command", text(Last, "error: no such command")),
-            ("error: characters were lost", text(Last, "error: characters were lost")),
-            ("@1e ok", text(Unasked, "ok")),
-            ("@20 ok", text(Cut, "ok")),
-            ("@zz ok", text(Line, "@zz ok")),
+            ("@1f faults 4", ""),
+            ("@1f faul", ""),
+            ("", ""),
+            ("* fault 4: dc link; likely: x", "unasked * fault 4: dc link; likely: x"),
+            ("fault 4: dc link", "line fault 4: dc link"),
+            ("off: y", "line off: y"),
+            ("\x1b[Kcause 1: 25 °C \x07", "line cause 1: 25 °C"),
+            ("ok", "line ok"),
+            ("@1f ok: limited to 3.4 A", "answer ok: limited to 3.4 A"),
+            ("@1f error: no such command", "answer error: no such command"),
+            ("error: characters were lost", "answer error: characters were lost"),
+            ("@1e ok", "unasked ok"),
+            ("@20 ok", "cut ok"),
+            ("@zz ok", "line @zz ok"),
         ] {
-            assert_eq!(heard(asked(0x1f, "faults 4"), line), expected, "{line}");
+            let expected: Vec<_> = [expected].into_iter().filter(|text| !text.is_empty()).collect();
+            assert_eq!(heard(&mut asked(0x1f, "faults 4"), &[line]), expected, "{line}");
         }
-        assert_eq!(heard(asked(0, "stop"), "@ffffffff ok"), text(Unasked, "ok"));
-        assert_eq!(heard(asked(u32::MAX, "stop"), "@0 ok"), text(Cut, "ok"));
+        assert_eq!(heard(&mut asked(0, "stop"), &["@ffffffff ok"]), ["unasked ok"]);
+        assert_eq!(heard(&mut asked(u32::MAX, "stop"), &["@0 ok"]), ["cut ok"]);
         let mut given_up = asked(5, "stop");
         given_up.give_up();
-        assert_eq!(heard(given_up, "@5 ok"), text(Unasked, "ok"));
+        assert_eq!(heard(&mut given_up, &["@5 ok"]), ["unasked ok"]);
+    }
+
+    /// The answer to an urgent line is no answer to the next request, and the rest of a list that was cut short belongs to no answer.
+    #[test]
+    fn answers_are_those_of_their_requests() {
+        let mut client = Client::default();
+        assert_eq!([client.send("stop"), client.send("")], ["@1 stop\n", "\n"]);
+        client.ask("status");
+        let lines = ["@1 ok", "* running: torque", "@2 off; dc link 311 V"];
+        let told = ["unasked ok", "unasked * running: torque", "answer off; dc link 311 V"];
+        assert_eq!(heard(&mut client, &lines), told);
+        assert!(!client.is_waiting());
+        client.ask("help");
+        assert_eq!(heard(&mut client, &["a  b", "c  d"]), ["line a  b", "line c  d"]);
+        client.send("stop");
+        assert_eq!(heard(&mut client, &["@4 ok", "e  f"]), ["cut ok", "unasked e  f"]);
+        client.ask("help");
+        let whole = ["line a  b", "line ok", "answer a  b|ok|ok"];
+        assert_eq!(heard(&mut client, &["a  b", "ok", "@5 ok"]), whole);
+    }
+
+    #[test]
+    fn the_last_line_of_an_answer_tells_whether_the_request_is_refused() {
+        for (lines, error, contents) in [
+            (&["off; x"][..], None, 1),
+            (&["a", "ok"], None, 1),
+            (&["a", "error: b"], Some("error: b"), 2),
+            (&["error: a", "ok"], None, 1),
+            (&[], None, 0),
+        ] {
+            let answer = Answer { lines: lines.iter().map(|line| (*line).to_owned()).collect() };
+            assert_eq!((answer.error(), answer.contents().len()), (error, contents), "{lines:?}");
+        }
     }
 }

@@ -86,9 +86,8 @@ pub struct Talk {
     /// The board.
     pub board: HostBoard,
     client: Client,
-    /// Questions; the client awaits the answer to the first. The next field holds the lines of that answer so far.
+    /// Questions; the client awaits the answer to the first.
     asks: VecDeque<(By, String)>,
-    lines: Vec<String>,
     /// Messages for the page.
     texts: Vec<Value>,
     frames: Frames,
@@ -107,7 +106,6 @@ impl Talk {
             board,
             client,
             asks: VecDeque::from([(By::Hello, "describe stream".to_owned())]),
-            lines: Vec::new(),
             texts: Vec::new(),
             frames: Frames::default(),
             since_status_ms: 0,
@@ -166,14 +164,14 @@ impl Talk {
             for byte in self.board.read() {
                 match self.client.push(byte) {
                     Some(Event::Frame(frame)) => self.frames.push(frame),
-                    Some(Event::Line(line)) => self.lines.push(line),
-                    Some(Event::Last(line)) => self.answered(line),
+                    Some(Event::Answer(answer)) => self.answered(answer.lines),
                     Some(Event::Cut(line)) => {
                         self.show(&line);
-                        self.answered("error: cut short by the stop".to_owned());
+                        let why = "error: cut short by the stop";
+                        self.answered(vec![why.to_owned()]);
                     }
                     Some(Event::Unasked(line)) => self.show(&line),
-                    None => {}
+                    Some(Event::Line(_)) | None => {}
                 }
             }
         }
@@ -183,10 +181,7 @@ impl Talk {
         self.texts.push(json!({ "line": line }));
     }
 
-    /// Handles the last line of an answer.
-    fn answered(&mut self, last: String) {
-        self.lines.push(last);
-        let lines = std::mem::take(&mut self.lines);
+    fn answered(&mut self, lines: Vec<String>) {
         let Some((by, line)) = self.asks.pop_front() else { return };
         match by {
             By::Page(number) => {

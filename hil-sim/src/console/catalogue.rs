@@ -1,8 +1,9 @@
 //! The commands and settings of a drive, as the drive lists them; and the completion of a line from them.
 
+use drive_stream::client::Answer;
 use serde_json::Value;
 
-use super::link::{Answer, Link, LinkError};
+use super::link::{Link, LinkError};
 use super::own;
 
 /// A command, or a setting after `set`, with the words that can follow it.

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drive_stream::Frame;
-use drive_stream::client::{Client, Event, is_error};
+use drive_stream::client::{Answer, Client, Event};
 
 use super::trace::Trace;
 
@@ -28,28 +28,6 @@ pub enum LinkError {
     /// An urgent line was sent meanwhile, which ends a list.
     #[error("`{0}`: cut short by another line")]
     Cut(String),
-}
-
-/// The answer to a command.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Answer {
-    /// The lines of the answer, including the last one.
-    pub lines: Vec<String>,
-}
-
-impl Answer {
-    /// Returns the line that refuses the command.
-    pub fn error(&self) -> Option<&str> {
-        self.lines.last().map(String::as_str).filter(|line| is_error(line))
-    }
-
-    /// Returns the lines without an `ok` at the end.
-    pub fn contents(&self) -> &[String] {
-        match self.lines.split_last() {
-            Some((last, before)) if last == "ok" => before,
-            _ => &self.lines,
-        }
-    }
 }
 
 /// Destinations of the drive's lines and frames.
@@ -74,7 +52,7 @@ impl Route {
             }
             Event::Cut(ref line) => (self.show)(line),
             Event::Line(ref line) => self.trace.push(line),
-            Event::Last(_) => {}
+            Event::Answer(_) => {}
         }
         self.asked.as_ref().map(|asked| asked.send(event));
     }
@@ -188,7 +166,6 @@ fn hear(
     events: &Receiver<Event>,
     mut show: impl FnMut(&str),
 ) -> Result<Answer, LinkError> {
-    let mut answer = Answer::default();
     // A trace is recorded before anything is sent.
     let is_trace = command.split_whitespace().next() == Some("trace");
     let patience = if is_trace { PATIENCE_WITH_TRACE } else { PATIENCE };
@@ -197,14 +174,13 @@ fn hear(
             RecvTimeoutError::Timeout => LinkError::Silence(command.to_owned(), patience.as_secs()),
             RecvTimeoutError::Disconnected => LinkError::Closed,
         })?;
-        let is_last = matches!(event, Event::Last(_));
-        let (Event::Line(line) | Event::Last(line)) = event else {
-            return Err(LinkError::Cut(command.to_owned()));
-        };
-        show(&line);
-        answer.lines.push(line);
-        if is_last {
-            return Ok(answer);
+        match event {
+            Event::Line(line) => show(&line),
+            Event::Answer(answer) => {
+                show(answer.last());
+                return Ok(answer);
+            }
+            _ => return Err(LinkError::Cut(command.to_owned())),
         }
     }
 }
@@ -243,76 +219,4 @@ fn read(mut reader: impl Read, route: &Mutex<Route>) {
     let mut route = locked(route);
     route.closed = true;
     route.asked = None;
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Simulates a drive that answers each request with the next of these texts; returns the lines that were shown as unsolicited.
-    #[cfg(unix)]
-    fn talk(answers: &'static [&str], with: impl FnOnce(&mut Link, &Urgent)) -> Vec<String> {
-        use std::io::{BufRead as _, BufReader};
-        use std::os::unix::net::UnixStream;
-        let (ours, theirs) = UnixStream::pair().unwrap();
-        let (shown, unasked) = channel();
-        let show = move |line: &str| drop(shown.send(line.to_owned()));
-        let mut link = Link::new(ours.try_clone().unwrap(), ours, show);
-        let mut out = theirs.try_clone().unwrap();
-        let drive = std::thread::spawn(move || {
-            let lines = BufReader::new(theirs).lines().map_while(Result::ok);
-            // The order matters: the simulated drive does not wait for a line after the last answer.
-            for (answer, _) in answers.iter().zip(lines.filter(|line| !line.is_empty())) {
-                std::thread::sleep(Duration::from_millis(30));
-                out.write_all(answer.as_bytes()).unwrap();
-            }
-        });
-        let urgent = link.urgent();
-        with(&mut link, &urgent);
-        drive.join().unwrap();
-        std::thread::sleep(Duration::from_millis(50));
-        unasked.try_iter().collect()
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn the_answer_to_an_urgent_line_is_no_answer_to_the_next_command() {
-        let answers = &["@1 ok\r\n", "* running: torque\r\n@2 off; dc link 311 V\r\n"];
-        let shown = talk(answers, |link, urgent| {
-            urgent.send("stop").unwrap();
-            urgent.send("").unwrap();
-            assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; dc link 311 V"]);
-        });
-        assert_eq!(shown, ["ok", "* running: torque"]);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn an_urgent_line_cuts_a_list_short_and_nothing_else() {
-        let answers = &[
-            "a  b\r\nc  d\r\n",
-            "@2 ok\r\n",
-            "@3 off; x\r\n",
-            "@4 ok\r\n",
-            "off: y\r\nok\r\n@5 ok\r\n",
-        ];
-        let shown = talk(answers, |link, urgent| {
-            let later = |urgent: Urgent| {
-                std::thread::spawn(move || {
-                    std::thread::sleep(Duration::from_millis(10));
-                    urgent.send("stop").unwrap();
-                })
-            };
-            let sent = later(urgent.clone());
-            let cut = link.ask("help", |_| ());
-            assert!(matches!(cut, Err(LinkError::Cut(_))), "{cut:?}");
-            sent.join().unwrap();
-            let sent = later(urgent.clone());
-            assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; x"]);
-            sent.join().unwrap();
-            // Lines that look like unsolicited ones, or like an end, still belong to a list.
-            assert_eq!(link.ask("help", |_| ()).unwrap().lines, ["off: y", "ok", "ok"]);
-        });
-        assert_eq!(shown, ["ok", "ok"]);
-    }
 }

@@ -3,7 +3,9 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-use crate::console::link::{Answer, Link, LinkError, Urgent, locked};
+use drive_stream::client::Answer;
+
+use crate::console::link::{Link, LinkError, Urgent, locked};
 use crate::console::open;
 use crate::prelude::*;
 

@@ -12,10 +12,10 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result, ensure};
 use drive_core::Sample;
 use drive_settings::find;
-use drive_stream::client::{Client, Event};
+use drive_stream::client::{Answer, Client, Event};
 use hil_sim::Error;
 use hil_sim::config::LoadMode;
-use hil_sim::console::link::{Answer, LinkError};
+use hil_sim::console::link::LinkError;
 use hil_sim::first_light::Options as Light;
 use hil_sim::first_light::evidence::{Evidence, Record, SCHEMA, Verdict};
 use hil_sim::first_light::person::Person;
@@ -198,18 +198,15 @@ impl Bench {
         self.sent.push(line.to_owned());
         self.pulses = false;
         self.board.send(self.client.ask(line).as_bytes());
-        let (mut answer, mut silence) = (Answer::default(), 0.0);
+        let mut silence = 0.0;
         while silence < PATIENCE_S {
             self.run(0.02).unwrap();
             silence += 0.02;
             for event in self.hear() {
                 silence = 0.0;
-                if let Event::Line(line) | Event::Last(line) = event {
-                    answer.lines.push(line);
+                if let Event::Answer(answer) = event {
+                    return Ok(answer);
                 }
-            }
-            if !self.client.is_waiting() {
-                return Ok(answer);
             }
         }
         Err(LinkError::Silence(line.to_owned(), PATIENCE_S as u64))
