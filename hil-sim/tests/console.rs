@@ -8,8 +8,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::{Arc, Mutex};
 
+use drive_core::{Fault, State};
 use hil_sim::console::catalogue::Catalogue;
-use hil_sim::console::link::{Link, LinkError};
+use hil_sim::console::link::{Link, LinkError, is_off};
+use induction_drive::desk::power::Power;
+use induction_drive::settings::FirmwareSettings;
 use serialport::{SerialPort as _, TTYPort};
 
 /// A firmware with two settings.
@@ -220,4 +223,17 @@ fn an_answer_that_cannot_be_whole_ends_the_wait() {
             other => panic!("{said:?}: {other:?}"),
         }
     }
+}
+
+/// In the words of the firmware.
+#[test]
+fn the_outputs_are_off_in_the_states_in_which_they_are() {
+    let running =
+        [State::Calibrating, State::Torque, State::Learning, State::Braking, State::Stopping];
+    let faults = Fault::ALL.iter().map(|fault| State::Fault(*fault));
+    for state in running.into_iter().chain([State::Off]).chain(faults) {
+        let power = Power::of(Some(state), &FirmwareSettings::of_the_board()).name();
+        assert_eq!(is_off(&format!("{state}; {power}; i_d 0.00 A")), state.is_off(), "{state}");
+    }
+    assert!(!is_off("error: the control interrupt does not run") && !is_off("off"));
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use drive_stream::client::Answer;
 use drive_web::{loops, talk};
-use hil_sim::console::link::{Link, LinkError};
+use hil_sim::console::link::{Link, LinkError, is_off};
 use serde_json::{Value, json};
 
 use crate::shared::{Ask, Shared};
@@ -117,8 +117,8 @@ fn converse(shared: &Shared, link: &mut Link) {
 
 fn show_status(shared: &Shared, status: &str) {
     shared.heard();
-    let rests = ["off", "in fault", "stopping"].iter().any(|state| status.starts_with(state));
-    if !rests && shared.is_abandoned() {
+    // A drive that is stopping takes another `stop`.
+    if !is_off(status) && shared.is_abandoned() {
         shared.send("stop");
     }
     shared.tell(json!({ "status": status }));

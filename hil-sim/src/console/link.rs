@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use drive_stream::Frame;
 use drive_stream::client::{Answer, Client, Event};
+use induction_drive::desk::power::Power;
 
 use super::trace::Trace;
 
@@ -28,6 +29,13 @@ pub enum LinkError {
     /// An urgent line was sent meanwhile, which ends a list.
     #[error("`{0}`: cut short by another line")]
     Cut(String),
+}
+
+/// Whether the outputs are off, by the state under its name in CiA 402 in the line of `status`.
+pub fn is_off(status: &str) -> bool {
+    let name = status.split("; ").nth(1);
+    let off = [Power::SwitchOnDisabled, Power::ReadyToSwitchOn, Power::Fault];
+    off.into_iter().any(|power| name == Some(power.name()))
 }
 
 /// Destinations of the drive's lines and frames.

@@ -8,6 +8,7 @@ use super::evidence::{Evidence, Record, SCHEMA, Verdict};
 use super::person::Person;
 use super::table::{Act, Board, Limits, Read, Ready, Table};
 use super::wire::Wire;
+use crate::console::link::is_off;
 use crate::prelude::*;
 
 /// `command.timeout_s` while a step may switch the power stage on: a drive that receives nothing for this time stops by itself.
@@ -155,10 +156,9 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     fn switch_off(&mut self) -> Checked {
         // The drive refuses `stop` in a fault, in which the outputs are already off.
         let _ = self.send("stop");
-        let is_off = |line: &String| line.starts_with("off") || line.starts_with("in fault");
         for _ in 0..STOPS_S {
             self.send("status")?;
-            if self.state.said.iter().any(is_off) {
+            if self.state.said.iter().any(|line| is_off(line)) {
                 self.state.doubts.clear();
                 return self.send("set command.timeout_s 0").and_then(|()| self.send("save"));
             }
