@@ -67,14 +67,23 @@ impl Route {
 }
 
 /// Both directions of a connection.
-struct Wire {
+pub struct Wire {
     port: Mutex<Box<dyn Write + Send>>,
     route: Mutex<Route>,
 }
 
 impl Wire {
+    /// Sends a line at once, without waiting for an answer that is awaited. Its answer is shown, unless a list is being answered: then the
+    /// line cuts the list short.
+    ///
+    /// # Errors
+    /// The port is closed.
+    pub fn send(&self, line: &str) -> Result<(), LinkError> {
+        self.write(|route| route.client.send(line))
+    }
+
     /// Sends the line that the client makes; lines leave in the order of their tags.
-    fn send(&self, line: impl FnOnce(&mut Route) -> String) -> Result<(), LinkError> {
+    fn write(&self, line: impl FnOnce(&mut Route) -> String) -> Result<(), LinkError> {
         let mut port = locked(&self.port);
         let line = line(&mut locked(&self.route));
         let sent = port.write_all(line.as_bytes()).and_then(|()| port.flush());
@@ -82,22 +91,11 @@ impl Wire {
     }
 }
 
+/// Sends urgent lines; see [`Wire::send`].
+pub type Urgent = Arc<Wire>;
+
 /// A connection to a drive.
 pub struct Link(Arc<Wire>);
-
-/// Sends urgent lines, without waiting for an answer that is awaited.
-#[derive(Clone)]
-pub struct Urgent(Arc<Wire>);
-
-impl Urgent {
-    /// Sends a line at once. Its answer is shown, unless a list is being answered: then the line cuts the list short.
-    ///
-    /// # Errors
-    /// The port is closed.
-    pub fn send(&self, line: &str) -> Result<(), LinkError> {
-        self.0.send(|route| route.client.send(line))
-    }
-}
 
 impl Link {
     /// Makes a connection over two directions of a port; `show` gets the lines that answer nothing.
@@ -127,7 +125,7 @@ impl Link {
 
     /// Returns a sender for urgent lines.
     pub fn urgent(&self) -> Urgent {
-        Urgent(self.0.clone())
+        self.0.clone()
     }
 
     /// Whether the port is closed.
@@ -138,7 +136,7 @@ impl Link {
     /// Ends a line that may have begun on the drive's side, and ignores its answer.
     pub fn begin(&mut self) {
         // A closed port is detected by the first command.
-        let _ = self.urgent().send("");
+        let _ = self.0.send("");
         std::thread::sleep(Duration::from_millis(100));
     }
 
@@ -151,7 +149,7 @@ impl Link {
         if self.is_closed() {
             return Err(LinkError::Closed);
         }
-        let sent = self.0.send(|route| {
+        let sent = self.0.write(|route| {
             route.asked = Some(send);
             route.client.ask(command)
         });
