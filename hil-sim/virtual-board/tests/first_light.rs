@@ -682,9 +682,11 @@ fn a_serial_port_that_goes_is_noted() -> Result<()> {
     let (table, file) = (Table::read()?, folder.join("evidence.toml"));
     let mut board = command(&folder, &["--fast"]);
     let mut board = Puller(board.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?);
-    let mut first = String::new();
-    BufReader::new(board.0.stdout.take().context("its output")?).read_line(&mut first)?;
-    let path = first.trim().strip_prefix("console: ").context("a port")?;
+    let mut shown = BufReader::new(board.0.stdout.take().context("its output")?).lines();
+    let first = shown.next().context("its port")??;
+    let path = first.strip_prefix("console: ").context("a port")?;
+    // A line that comes before the greeting is lost.
+    ensure!(shown.map_while(Result::ok).any(|line| line.contains("last run: ")), "no greeting");
     let mut port = Port::new(path, 115_200, Arc::default())?;
     let version = port.ask("version")?.lines.join(" ");
     let build = version.split(", build ").nth(1).and_then(|rest| rest.split(';').next());
