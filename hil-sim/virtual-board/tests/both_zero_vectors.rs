@@ -7,8 +7,7 @@ use std::rc::Rc;
 use anyhow::Result;
 use drive_core::{Fault, State};
 use hil_sim::Config;
-use virtual_board::power_stage::{ALL, REFERENCE};
-use virtual_board::{Board, Image, Options, Pair};
+use virtual_board::{Image, Options, Pair};
 
 const YES: &str = "set scales.both_zero_vectors yes";
 
@@ -150,32 +149,6 @@ fn a_conversion_that_is_missing_in_the_upper_zero_vector_is_noticed() -> Result<
         pair.run(3, |_, _| {})?;
         assert_eq!(pair.shadow.drive.state().fault(), Some(Fault::ConverterOverrun), "{lost:?}");
         assert!(!pair.board.chip().tim1.outputs_on());
-    }
-    Ok(())
-}
-
-/// Shunts below the low sides carry no current there: their boards refuse the setting by name, and continue as before.
-#[test]
-fn a_board_with_shunts_refuses_it() -> Result<()> {
-    for stage in ALL.into_iter().filter(|stage| **stage != REFERENCE) {
-        let options = Options::on(stage, &stage.config()?, 44);
-        let mut board = Board::new(Image::built_for(stage.name)?, options)?;
-        common::until_said(&mut board, "last run: ")?;
-        for (line, answer) in [
-            (YES, "ok: staged"),
-            (
-                "apply",
-                "error: scales.both_zero_vectors = yes: shunts below the low sides see nothing in the upper zero vector; set it to no",
-            ),
-            ("revert", "ok"),
-            ("start torque", "ok"),
-        ] {
-            board.run_periods(600)?;
-            board.take_console();
-            board.type_line(line);
-            common::until_said(&mut board, answer)?;
-        }
-        assert!(!board.chip().adc.samples_twice() && board.violations().is_empty());
     }
     Ok(())
 }
