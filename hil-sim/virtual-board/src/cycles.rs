@@ -181,13 +181,13 @@ fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Row>
     pair.board.longest_to_compares = LongestPath::default();
     for line in orders {
         // The drive accepts the request, or limits it.
-        pair.say(line)?;
+        pair.ask(line)?;
         pair.board.type_line("trace 500 2");
         pair.run(6000, |_, period| cycles.push(in_turn(period)))?;
     }
     pair.board.send(b"\n");
     pair.run(60, |_, _| {})?;
-    pair.say("stop")?;
+    pair.ask("stop")?;
     pair.until_state(State::Off)?;
     let whole = pair.board.longest.cycles;
     let path = std::mem::take(&mut pair.board.longest_to_compares);

@@ -1,8 +1,8 @@
 //! A board and its shadow: the compare values of both are compared, and the shadow knows the state of the drive.
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 use drive_core::State;
-use induction_drive::console::line::UNASKED;
+use drive_stream::client::{Answer, Client, Event};
 
 use crate::board::{Board, Options, Period};
 use crate::{image::Image, shadow::Shadow};
@@ -29,9 +29,7 @@ impl Pair {
     /// The board does not start.
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let mut pair = Self { shadow: Shadow::new(&options)?, board: Board::new(image, options)? };
-        pair.until("the greeting", LONGEST_ANSWER, |pair, _| {
-            pair.board.take_console().ends_with('\n')
-        })?;
+        pair.greeted()?;
         Ok(pair)
     }
 
@@ -71,37 +69,47 @@ impl Pair {
         bail!("{what} did not come; the drive is {}; log {log:#?}", self.shadow.drive.state())
     }
 
-    /// Types a line and waits for its answer; returns the first line that is no announcement, and the lines after it.
+    /// Runs until the drive has greeted after a reset.
     ///
     /// # Errors
     /// As [`Pair::until`].
-    pub fn say(&mut self, line: &str) -> Result<String> {
+    pub fn greeted(&mut self) -> Result<()> {
+        let ends = |pair: &mut Self, _| pair.board.take_console().ends_with('\n');
+        self.until("the greeting", LONGEST_ANSWER, ends)
+    }
+
+    /// Types a line and waits for its answer.
+    ///
+    /// # Errors
+    /// As [`Pair::until`].
+    pub fn ask(&mut self, line: &str) -> Result<Answer> {
         // First the drive finishes its current output.
         self.run(QUIET, |_, _| {})?;
         self.board.take_console();
-        self.board.type_line(line);
+        let mut client = Client::default();
+        self.board.send(client.ask(line).as_bytes());
         self.shadow.type_line(line)?;
-        let mut answer = String::new();
+        let mut answer = None;
         self.until(&format!("an answer to {line:?}"), LONGEST_ANSWER, |pair, _| {
-            answer += &pair.board.take_console();
-            while let Some((first, rest)) = answer.split_once('\n')
-                && first.starts_with(UNASKED)
-            {
-                answer = rest.to_owned();
+            let said = pair.board.take_console();
+            for event in said.bytes().filter_map(|byte| client.push(byte)) {
+                if let Event::Answer(whole) = event {
+                    answer = Some(whole);
+                }
             }
-            answer.ends_with('\n')
+            answer.is_some() && said.ends_with('\n')
         })?;
-        Ok(answer.trim_end().to_owned())
+        answer.context("an answer")
     }
 
     /// Types a line that the drive must accept.
     ///
     /// # Errors
-    /// As [`Pair::until`]; also if the answer is not `ok`.
+    /// As [`Pair::until`]; also if the drive refuses the line.
     pub fn order(&mut self, line: &str) -> Result<()> {
-        match self.say(line)?.as_str() {
-            answer if answer.starts_with("ok") => Ok(()),
-            answer => bail!("{line:?}: {answer}"),
+        match self.ask(line)?.error() {
+            None => Ok(()),
+            Some(why) => bail!("{line:?}: {why}"),
         }
     }
 

@@ -12,7 +12,7 @@ use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, CODES, REFERENCE_V, channel};
 use virtual_board::{Board, Image, Options, Pair, PowerStage};
 
-use crate::common::until_said as said;
+use crate::common::{off_for, say, until_said as said};
 
 /// An action that ends a run.
 type End<'a> = &'a dyn Fn(&mut Board) -> Result<()>;
@@ -35,16 +35,6 @@ fn pair(stage: &'static PowerStage) -> Result<Pair> {
 fn start(pair: &mut Pair) -> Result<()> {
     pair.start_torque()?;
     assert!(pair.board.gates().any_on());
-    Ok(())
-}
-
-/// Runs for some periods and checks that every gate is off in them.
-fn off_for(board: &mut Board, periods: u64) -> Result<()> {
-    for _ in 0..periods {
-        assert!(!board.gates().any_on(), "{:.3} s", board.time());
-        board.run_periods(1)?;
-        while board.next_period().is_some() {}
-    }
     Ok(())
 }
 
@@ -162,10 +152,8 @@ fn the_image_of_another_board_drives_no_gate() -> Result<()> {
                 continue;
             }
             said(&mut board, "last run: ")?;
-            board.take_console();
             for line in ["start vf", "confirm board"] {
-                board.type_line(line);
-                let answer = said(&mut board, "error: ")?;
+                let answer = say(&mut board, line, "error: ")?;
                 let names = format!("for the board {}, ", of.name);
                 let theirs = format!("flash the image of {}", stage.name);
                 assert!(answer.contains(&names) && answer.contains(&theirs), "{answer}");
@@ -197,9 +185,7 @@ fn a_confirmation_connects_the_gates() -> Result<()> {
             modes.iter().all(|mode| *mode == 2)
         };
         assert!(!connected(&mut board), "{}", stage.name);
-        board.take_console();
-        board.type_line("confirm board");
-        said(&mut board, "ok")?;
+        say(&mut board, "confirm board", "ok")?;
         assert!(connected(&mut board), "{}", stage.name);
         // The check of the registers goes through all of them.
         off_for(&mut board, 1200)?;

@@ -204,7 +204,7 @@ fn the_chopper_survives_a_torn_word_of_the_history() -> Result<()> {
     let mut board = Board::new(Image::built()?, options)?;
     board.chip().flash.tear(HISTORY);
     let mut pair = Pair { shadow, board };
-    pair.until("the greeting", 30_000, |pair, _| pair.board.take_console().ends_with('\n'))?;
+    pair.greeted()?;
     assert!(!pair.board.take_log()?.iter().any(|line| line.contains("break input")));
     let mut pair = ordered(pair, &[])?;
     let duty = brakes(&mut pair)?;
@@ -228,9 +228,9 @@ fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
     pair.board.plant.set_mains(0.0)?;
     pair.until("an empty link", 60_000, |pair, _| pair.board.plant.dc_link() < 50.0)?;
     assert!(!pair.board.chip().relay_pin());
-    let answer = pair.say("start torque")?;
+    let answer = pair.ask("start torque")?;
     assert_eq!(
-        answer,
+        answer.last(),
         "error: the precharge relay is open: the dc link is too low, or not steady yet"
     );
     pair.board.plant.set_mains(mains)?;

@@ -10,21 +10,13 @@ use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
 use virtual_board::{Board, Image, Options, Pair};
 
-use crate::common::until_said as said;
+use crate::common::{say as ask, until_said as said};
 
 fn board(stage: &'static PowerStage) -> Result<Board> {
     let mut board =
         Board::new(Image::built_for(stage.name)?, Options::on(stage, &stage.config()?, 5))?;
     said(&mut board, "last run: ")?;
     Ok(board)
-}
-
-/// Types a line, and checks the beginning of its answer.
-fn ask(board: &mut Board, line: &str, answer: &str) -> Result<String> {
-    board.run_periods(120)?;
-    board.take_console();
-    board.type_line(line);
-    said(board, answer).context(line.to_owned())
 }
 
 const REFUSED: &str =

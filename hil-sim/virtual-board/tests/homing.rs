@@ -17,26 +17,14 @@ fn the_image_finds_the_stop_and_counts_from_it() -> Result<()> {
     pair.until_state(State::Position)?;
     // From here the image gives itself commands, which its shadow on the host does not know.
     let mut board = pair.board;
-    let mut say = |line: &str, until: &str| {
-        board.take_console();
-        board.type_line(line);
-        let mut said = String::new();
-        for _ in 0..200 {
-            board.run_periods(600)?;
-            while board.next_period().is_some() {}
-            said += &board.take_console();
-            if said.contains(until) {
-                return anyhow::Ok((said, board.plant.mechanical_angle()));
-            }
-        }
-        anyhow::bail!("{until}: {said}")
-    };
-    let (said, stop) = say("home 60 0.6 2", "homing: ")?;
+    let said = common::say(&mut board, "home 60 0.6 2", "homing: ")?;
     assert!(said.contains("homing: position 0 is at the stop"), "{said}");
-    say("position -0.25", "ok")?;
+    let stop = board.plant.mechanical_angle();
+    common::say(&mut board, "position -0.25", "ok")?;
     // A stop by ramp waits until the shaft is at rest.
-    std::iter::repeat_n("status", 20).try_for_each(|line| say(line, "turns").map(|_| ()))?;
-    let (said, end) = say("stop ramp", "off: ")?;
+    board.run_periods(12_000)?;
+    let said = common::say(&mut board, "stop ramp", "off: ")?;
+    let end = board.plant.mechanical_angle();
     let moved = (end - stop) / std::f64::consts::TAU;
     println!("the stop at {stop:.3} rad, then {moved:.4} turns: {said}");
     assert!((moved + 0.25).abs() < 0.003, "{moved} turns");

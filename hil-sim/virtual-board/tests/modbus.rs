@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::Command;
 use std::{env, fs};
 
+use crate::common::{say, until_said};
 use anyhow::{Context, Result, ensure};
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
@@ -65,24 +66,11 @@ impl Master {
     fn with(options: Options, lines: &[&str]) -> Result<Self> {
         let board = Board::new(Image::built()?, options)?;
         let mut master = Self { board, answered: ANSWERED };
-        master.until_said("last run")?;
+        until_said(&mut master.board, "last run")?;
         for line in lines {
-            master.board.type_line(line);
-            master.until_said("ok")?;
+            say(&mut master.board, line, "ok")?;
         }
         Ok(master)
-    }
-
-    fn until_said(&mut self, text: &str) -> Result<String> {
-        let mut said = String::new();
-        for _ in 0..300 {
-            self.board.run_periods(100)?;
-            said += &self.board.take_console();
-            if said.contains(text) && said.ends_with('\n') {
-                return Ok(said);
-            }
-        }
-        anyhow::bail!("no {text:?} in {said:?}")
     }
 
     /// Sends bytes; returns the bytes that the board sends meanwhile.
@@ -222,12 +210,7 @@ fn the_answer_comes_at_once_and_in_one_piece() -> Result<()> {
 /// drive before it has written a stop. Without frames the drive stops after the time-out of commands.
 #[test]
 fn one_commands_anybody_stops_and_a_lost_bus_stops_the_drive() -> Result<()> {
-    let mut master = Master::new(&[])?;
-    assert_eq!(master.write(COMMAND, 18)?, Some(SERVER_FAILURE));
-    assert!(master.until_said("bus: ")?.contains("bus: refused: the console commands"));
     let mut master = Master::new(&BUS)?;
-    master.board.type_line("start");
-    assert!(master.until_said("error")?.contains("error: the bus commands"));
     for last in ["stop", "silence"] {
         assert_eq!(master.write(COMMAND, 1)?, None);
         assert_eq!(master.write(COMMAND, 18)?, None);
@@ -271,31 +254,6 @@ fn rate_format_and_address_follow_the_settings() -> Result<()> {
     Ok(())
 }
 
-/// Settings as floats: written, read back, refused out of range, put into force and saved; they survive a reset.
-#[test]
-fn settings_are_written_and_saved() -> Result<()> {
-    let mut master = Master::new(&BUS)?;
-    let read = |master: &mut Master| master.float(0x4000);
-    assert_eq!(read(&mut master)?, 5.4);
-    let write = |ohm: f32| [&[16, 0x40, 0, 0, 2, 4][..], &ohm.to_be_bytes()].concat();
-    assert_eq!(master.ask(&write(5.3))?, [16, 0x40, 0, 0, 2]);
-    assert_eq!(master.ask(&write(1e9))?, [0x90, 3]);
-    assert_eq!(master.read(0x4fff, 1)?, [1], "staged");
-    assert_eq!(master.write(0x4fff, 2)?, None);
-    // While the controllers are designed every request is answered with exception 6.
-    let mut busy = 0;
-    while master.ask(&[3, 0x40, 0, 0, 2])? == [0x83, 6] {
-        busy += 1;
-    }
-    assert!((10..2000).contains(&busy), "{busy} times");
-    master.board.run_periods(3000)?;
-    assert_eq!((read(&mut master)?, master.read(0x4fff, 1)?), (5.3, vec![0]));
-    master.board.reset(virtual_board::periph::Reset::Pin);
-    master.until_said("last run")?;
-    assert_eq!(read(&mut master)?, 5.3);
-    Ok(())
-}
-
 /// Writes of a master that was set up with the image of version 0.1.0: addresses, and values that are not the default.
 const WRITTEN: [(u16, f32); 7] = [
     (0x400c, 0.013),
@@ -332,10 +290,15 @@ fn a_master_that_was_set_up_before_needs_no_other_numbers() -> Result<()> {
     }
     assert_eq!(master.write(0x4fff, 2)?, None);
     // While the controllers are designed every request is answered with exception 6.
-    while master.ask(&[3, 0x40, 0, 0, 2])? == [0x83, 6] {}
+    let mut busy = 0;
+    while master.ask(&[3, 0x40, 0, 0, 2])? == [0x83, 6] {
+        busy += 1;
+    }
+    assert!((10..2000).contains(&busy), "{busy} times");
     master.board.run_periods(3000)?;
+    assert_eq!(master.read(0x4fff, 1)?, [0], "nothing is staged");
     master.board.reset(virtual_board::periph::Reset::Pin);
-    master.until_said("last run")?;
+    until_said(&mut master.board, "last run")?;
     for (at, value) in WRITTEN {
         assert_eq!(master.float(at)?, value, "{at:#x}");
     }

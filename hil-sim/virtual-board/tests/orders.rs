@@ -44,7 +44,7 @@ fn cost(pair: &mut Pair, line: &str) -> Result<(u32, u32)> {
 #[test]
 fn an_order_leaves_most_of_the_period() -> Result<()> {
     let mut pair = common::pair(&Config::default(), 5)?;
-    pair.say("set motor.inertia 0.013")?;
+    pair.ask("set motor.inertia 0.013")?;
     for line in ["apply", "start"] {
         let (taken, _) = cost(&mut pair, line)?;
         assert!(taken <= LONGEST_INTERRUPT_CYCLES, "{line}: {taken} cycles");

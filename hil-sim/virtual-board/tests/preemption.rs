@@ -1,6 +1,7 @@
 //! Code that the control interrupt preempts continues undisturbed.
 
 use anyhow::{Context, Result};
+use drive_core::State;
 use hil_sim::Config;
 use induction_drive::board::CYCLES_PER_US;
 use rand::{RngExt, SeedableRng};
@@ -31,8 +32,15 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     let mut options = Options::new(&Config::default(), 5);
     options.counting = Counting { cycles: true, every_instruction: true };
     let mut pair = Pair::new(Image::built()?, options)?;
-    pair.say("log debug")?;
-    pair.start_torque()?;
+    // Without tags, as a person types: the seed below belongs to these instants.
+    for line in ["log debug", "start torque"] {
+        pair.run(120, |_, _| {})?;
+        pair.board.take_console();
+        pair.board.type_line(line);
+        pair.shadow.type_line(line)?;
+        pair.until("an answer", 30_000, |pair, _| pair.board.take_console().ends_with('\n'))?;
+    }
+    pair.until_state(State::Torque)?;
     let mut board = pair.board;
     board.take_log()?;
     board.poison = Some(Poison::new(board.image.symbol("_stack_start")?.address));

@@ -25,17 +25,14 @@ fn the_history_survives_power_off() -> Result<()> {
     let mut pair = common::regulating(8)?;
     pair.board.set_fault_pin(false);
     pair.run(1200, |_, _| {})?;
-    let totals = pair.say("history")?;
-    assert_eq!(totals.lines().next(), Some("powered 0.0 h, with current 0.0 h, starts 1"));
+    let totals = pair.ask("history")?.lines;
+    assert_eq!(totals[0], "powered 0.0 h, with current 0.0 h, starts 1");
     pair.board.set_fault_pin(true);
     let list = |board: &mut virtual_board::Board| -> Result<Vec<String>> {
         common::until_said(board, "last run: ")?;
         // A second in which nothing is written.
         board.run_periods(6000)?;
-        board.take_console();
-        board.type_line("history");
-        board.run_periods(3000)?;
-        Ok(board.take_console().lines().map(str::to_owned).collect())
+        Ok(common::ask(board, "history")?.lines)
     };
     let fault = "at 0.0 h, with current 0.0 h: fault 20, the power stage pulled the break input";
     pair.board.unplug();

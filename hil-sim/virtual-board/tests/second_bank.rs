@@ -4,6 +4,7 @@
 
 use std::ops::Range;
 
+use crate::common;
 use anyhow::{Result, ensure};
 use drive_core::Hardware;
 use hil_sim::Config;
@@ -23,10 +24,7 @@ const STEP: u64 = 40;
 
 fn greeted(seed: u64) -> Result<Board> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), seed))?;
-    while !board.take_console().ends_with('\n') {
-        board.run_periods(10)?;
-    }
-    while board.next_period().is_some() {}
+    common::until_said(&mut board, "last run: ")?;
     Ok(board)
 }
 

@@ -1,28 +1,20 @@
 //! The self-test of the over-voltage protection at start: its findings are reported, `start` is refused because of
 //! them, and no driver switches until the fault is repaired.
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, bail};
 use induction_drive::board::protection;
 use virtual_board::chip::{Damage, TICKS_PER_S};
 use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, DcLinkPin, REFERENCE};
 use virtual_board::{Board, Image, Options, PowerStage};
 
+use crate::common::off_for;
+
 /// Longest time from a reset to the greeting, and from a request to its effect, periods.
 const START: u64 = 30_000;
 
 const NEVER_TRIPS: &str = "the over-voltage comparator does not trip at the level zero";
 const TRIPS_ALWAYS: &str = "the over-voltage comparator trips at its own level";
-
-/// Runs for some periods and checks that no gate is on at their ends. In between a violation at the gates fails the run.
-fn off_for(board: &mut Board, periods: u64) -> Result<()> {
-    for _ in 0..periods {
-        board.run_periods(1)?;
-        ensure!(!board.gates().any_on(), "a gate is on after {:.3} s", board.time());
-        while board.next_period().is_some() {}
-    }
-    Ok(())
-}
 
 /// Returns the output of the console up to `end`, and checks that no gate is on before.
 fn hear_off(board: &mut Board, end: &str) -> Result<String> {

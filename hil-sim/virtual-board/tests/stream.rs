@@ -1,9 +1,10 @@
 //! The stream of the image: its rate, its losses, its cost, and the console beside it.
 
 use crate::common;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use drive_core::State;
-use drive_stream::{Frame, Piece, Splitter};
+use drive_stream::Frame;
+use drive_stream::client::{Answer, Client, Event};
 use virtual_board::Pair;
 
 /// Number of control periods per second.
@@ -11,46 +12,47 @@ const SECOND: u64 = 6000;
 /// Signals of the fastest stream that is guaranteed.
 const EIGHT: &str = "phi_deg i_d_a i_q_a v_d_v v_q_v speed_rpm dc_link_v turns";
 
-/// Lines and frames of a board.
+/// Frames and unsolicited lines of a board.
 #[derive(Default)]
 struct Ear {
-    splitter: Splitter,
+    client: Client,
     frames: Vec<Frame>,
-    text: String,
+    told: String,
     damaged: u32,
 }
 
 impl Ear {
-    fn hear(&mut self, pair: &mut Pair) {
-        let bytes = pair.board.chip().lpuart.line.take();
-        for byte in bytes {
-            match self.splitter.push(byte) {
-                Piece::Nothing => {}
-                Piece::Text(byte) => self.text.push(char::from(byte)),
-                Piece::Frame(frame) => self.frames.push(frame),
-                Piece::Damaged => self.damaged += 1,
+    /// Takes what the board has sent; returns the number of lines of the awaited answer that are among it, and the answer if it is whole.
+    fn hear(&mut self, pair: &mut Pair) -> (usize, Option<Answer>) {
+        let (mut lines, mut whole) = (0, None);
+        for byte in pair.board.chip().lpuart.line.take() {
+            match self.client.push(byte) {
+                None => {}
+                Some(Event::Frame(Some(frame))) => self.frames.push(frame),
+                Some(Event::Frame(None)) => self.damaged += 1,
+                Some(Event::Line(_)) => lines += 1,
+                Some(Event::Answer(answer)) => whole = Some(answer),
+                Some(Event::Unasked(line) | Event::Cut(line)) => self.told += &line,
             }
         }
+        (lines, whole)
     }
 
-    /// Runs until a line has come, and returns it with the number of periods; `None` after a second.
-    fn line(&mut self, pair: &mut Pair) -> Result<Option<(String, u64)>> {
-        for period in 1..=SECOND {
-            pair.run(1, |_, _| {})?;
-            self.hear(pair);
-            if let Some((line, rest)) = self.text.split_once('\n') {
-                let line = line.trim().to_owned();
-                self.text = rest.to_owned();
-                return Ok(Some((line, period)));
-            }
-        }
-        Ok(None)
-    }
-
-    fn ask(&mut self, pair: &mut Pair, line: &str) -> Result<(String, u64)> {
-        pair.board.type_line(line);
+    /// Returns the answer to a line, and the number of periods until it was whole. No line of it may take a second.
+    fn ask(&mut self, pair: &mut Pair, line: &str) -> Result<(Answer, u64)> {
+        pair.board.send(self.client.ask(line).as_bytes());
         pair.shadow.type_line(line)?;
-        self.line(pair)?.with_context(|| format!("no answer to {line:?}"))
+        let (mut periods, mut silence) = (0, 0);
+        while silence < SECOND {
+            pair.run(1, |_, _| {})?;
+            (periods, silence) = (periods + 1, silence + 1);
+            match self.hear(pair) {
+                (_, Some(answer)) => return Ok((answer, periods)),
+                (0, None) => {}
+                _ => silence = 0,
+            }
+        }
+        bail!("no answer to {line:?}")
     }
 
     /// Returns the number of frames that are missing according to the sequence numbers.
@@ -67,7 +69,7 @@ fn streaming(seed: u64) -> Result<(Pair, Ear)> {
     pair.order("baud 2000000")?;
     let mut ear = Ear::default();
     let (answer, _) = ear.ask(&mut pair, &format!("stream {EIGHT} 2000"))?;
-    ensure!(answer.starts_with("ok"), "{answer}");
+    ensure!(answer.error().is_none(), "{answer:?}");
     Ok((pair, ear))
 }
 
@@ -82,7 +84,7 @@ fn two_thousand_frames_a_second_of_eight_signals_and_a_console_that_answers() ->
     for line in ["stream", "status", "torque 1.5", "get motor.r_s", "status", "torque 1"].repeat(4)
     {
         let (answer, periods) = ear.ask(&mut pair, line)?;
-        ensure!(!answer.starts_with("error"), "{line}: {answer}");
+        ensure!(answer.error().is_none(), "{line}: {answer:?}");
         slowest = slowest.max(periods);
         pair.run(SECOND / 10 - periods, |_, _| {})?;
         ear.hear(&mut pair);
@@ -90,6 +92,7 @@ fn two_thousand_frames_a_second_of_eight_signals_and_a_console_that_answers() ->
     let seconds = pair.board.time() - began;
     let (received, missing) = (ear.frames.len(), ear.missing());
     let (answer, _) = ear.ask(&mut pair, "stream off")?;
+    let answer = answer.last();
     let slowest_ms = slowest as f64 / SECOND as f64 * 1e3;
     println!(
         "{:.0} frames/s, {missing} missing of {received}, slowest answer {slowest_ms:.1} ms; {answer}",
@@ -116,7 +119,7 @@ fn two_thousand_frames_a_second_of_eight_signals_and_a_console_that_answers() ->
 fn a_lost_link_stops_the_drive_and_brings_the_rate_back() -> Result<()> {
     let (mut pair, mut ear) = streaming(2)?;
     let (answer, _) = ear.ask(&mut pair, &format!("stream {EIGHT} 1000 alive 0.4"))?;
-    ensure!(answer.starts_with("ok"), "{answer}");
+    ensure!(answer.error().is_none(), "{answer:?}");
     // Empty lines are signs of life.
     for _ in 0..10 {
         pair.board.send(b"\n");
@@ -131,7 +134,7 @@ fn a_lost_link_stops_the_drive_and_brings_the_rate_back() -> Result<()> {
         while pair.board.next_period().is_some() {}
         ear.hear(&mut pair);
         let passed = pair.board.time() - began;
-        if ear.text.contains("stopped: no command for 0.4 s") {
+        if ear.told.contains("stopped: no command for 0.4 s") {
             break passed;
         }
         ensure!(passed < 1.0, "not stopped");
@@ -141,7 +144,7 @@ fn a_lost_link_stops_the_drive_and_brings_the_rate_back() -> Result<()> {
     pair.board.run_periods(2 * SECOND)?;
     while pair.board.next_period().is_some() {}
     ear.hear(&mut pair);
-    ensure!(ear.text.contains("link: 115200 baud"), "{}", ear.text);
+    ensure!(ear.told.contains("link: 115200 baud"), "{}", ear.told);
     let frames = ear.frames.len();
     pair.board.run_periods(SECOND)?;
     ear.hear(&mut pair);
@@ -165,19 +168,13 @@ fn longest(stream: bool) -> Result<(u32, f64)> {
     for line in ["torque 1.5", "torque -1", "torque 1"] {
         ear.ask(&mut pair, line)?;
         // Every seventh period: some of them have a report as well, independent of the beginning of the trace.
-        pair.board.type_line("trace 500 7");
-        pair.run(SECOND / 2, |_, _| {})?;
-        // The samples are printed as fast as the main loop gets to it: a second without a line is their end.
-        let mut samples = 0;
-        while ear.line(&mut pair)?.is_some() {
-            samples += 1;
-        }
-        ensure!(samples > 500, "{samples} lines of the trace");
+        let (trace, _) = ear.ask(&mut pair, "trace 500 7")?;
+        ensure!(trace.contents().len() > 500, "{} lines of the trace", trace.lines.len());
     }
-    pair.board.send(b"\n");
     let (status, _) = ear.ask(&mut pair, "status")?;
-    let latest = status.split("latest start ").nth(1).and_then(|text| text.split(' ').next());
-    let latest = latest.and_then(|text| text.parse().ok()).with_context(|| status.clone())?;
+    let latest = status.last().split("latest start ").nth(1);
+    let latest = latest.and_then(|text| text.split(' ').next()?.parse().ok());
+    let latest = latest.with_context(|| format!("{status:?}"))?;
     Ok((pair.board.longest.cycles, latest))
 }
 

@@ -19,7 +19,8 @@ fn angle_error(pair: &mut Pair, periods: u32) -> Result<f64> {
 
 /// Returns the rotor time constant that the image reports as used, ms, and whether there is an estimate.
 fn status(pair: &mut Pair) -> Result<(f64, bool)> {
-    let status = pair.say("status")?;
+    let answer = pair.ask("status")?;
+    let status = answer.last();
     let used = status.rsplit_once("; used ").and_then(|(_, used)| used.strip_suffix(" ms"));
     let used = used.and_then(|used| used.parse().ok());
     Ok((used.unwrap_or_else(|| panic!("{status}")), !status.contains("not found")))
@@ -67,10 +68,10 @@ fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     assert!(before.abs() > 5.0 && after.abs() < 1.4, "{before} and {after} degrees");
 
     // A cage with 30 % more resistance is 75 K above 25 degC; 6 % of the time constant are 15 K.
-    let warm = pair.say("status")?;
-    let celsius = warm.split_once("; rotor ").and_then(|(_, rest)| rest.split(' ').next());
+    let warm = pair.ask("status")?;
+    let celsius = warm.last().split_once("; rotor ").and_then(|(_, rest)| rest.split(' ').next());
     let celsius: f64 = celsius.and_then(|number| number.parse().ok()).unwrap_or_default();
-    assert!((celsius - 100.0).abs() < 20.0, "{warm}");
+    assert!((celsius - 100.0).abs() < 20.0, "{warm:?}");
 
     // Without torque the rotor is not observable: the status reports this, and the time constant in use stays.
     pair.order("torque 0")?;

@@ -1,5 +1,6 @@
 //! The check sum of the image, `update`, and ST's boot loader that it starts.
 
+use crate::common::{say, until_said};
 use anyhow::{Result, ensure};
 use hil_sim::Config;
 use hil_sim::console::update;
@@ -18,22 +19,9 @@ fn board() -> Result<Board> {
     Board::new(Image::built()?, Options::new(&Config::default(), 37))
 }
 
-/// Runs until the console prints this; returns all its output.
-fn until(board: &mut Board, text: &str, periods: u64) -> Result<String> {
-    let mut said = String::new();
-    for _ in 0..periods / 60 {
-        board.run_periods(60)?;
-        said += &board.take_console();
-        if said.contains(text) && said.ends_with('\n') {
-            return Ok(said);
-        }
-    }
-    anyhow::bail!("no `{text}` in {said:?}")
-}
-
+/// Returns the first output after a line.
 fn ask(board: &mut Board, line: &str) -> Result<String> {
-    board.type_line(line);
-    until(board, "\n", 3000)
+    say(board, line, "\n")
 }
 
 /// Returns the modes of all pins except PA2 and PA3.
@@ -48,14 +36,14 @@ fn modes(board: &mut Board) -> Vec<u32> {
 #[test]
 fn a_damaged_image_does_not_start_and_says_so() -> Result<()> {
     let mut board = board()?;
-    until(&mut board, "induction-drive", GREETING)?;
+    until_said(&mut board, "induction-drive")?;
     let version = ask(&mut board, "version")?;
     let check = board.cpu.word(board.image.symbol("__check")?.address).unwrap_or(0);
     ensure!(version.contains(&format!(", image {check:08x}, ")), "{version}");
     board.reset(Reset::Pin);
     let untouched = modes(&mut board);
     let refused = |board: &mut Board, why: &str| -> Result<()> {
-        let said = until(board, "damaged", 3000)?;
+        let said = until_said(board, "damaged")?;
         ensure!(said.starts_with("error: the image is damaged: `update"), "{why}: {said}");
         let said = ask(board, "@7 status")?;
         ensure!(said.starts_with("error: the image is damaged"), "{why}: {said}");
@@ -81,7 +69,7 @@ fn a_damaged_image_does_not_start_and_says_so() -> Result<()> {
         board.run_periods(1)?;
     }
     println!("{:.1} ms to the first pin", 1e3 * (board.time() - began));
-    until(&mut board, "induction-drive", GREETING).map(drop)
+    until_said(&mut board, "induction-drive").map(drop)
 }
 
 /// Returns the image as the `.bin` of `cargo firmware`; with `other` it has another commit in its text and the sum of that.
@@ -135,7 +123,7 @@ fn update(board: &mut Board, bytes: Vec<u8>) -> Result<Option<String>> {
 fn unsupplied() -> Result<Board> {
     let mut board = board()?;
     board.supply_stage(false, 1.0)?;
-    until(&mut board, "induction-drive", GREETING)?;
+    until_said(&mut board, "induction-drive")?;
     Ok(board)
 }
 
@@ -143,7 +131,7 @@ fn unsupplied() -> Result<Board> {
 #[test]
 fn a_loader_that_switches_a_gate_on_is_noticed() -> Result<()> {
     let mut board = board()?;
-    until(&mut board, "induction-drive", GREETING)?;
+    until_said(&mut board, "induction-drive")?;
     board.supply_stage(true, 10.0)?;
     board.run_periods(600)?;
     ensure!(ask(&mut board, "update gates-off")?.starts_with("ok: ST's loader is next"));
@@ -157,8 +145,7 @@ fn a_loader_that_switches_a_gate_on_is_noticed() -> Result<()> {
 fn the_program_writes_another_image_and_keeps_the_settings() -> Result<()> {
     let mut board = unsupplied()?;
     ask(&mut board, "set speed.ramp_rpm_per_s 777")?;
-    board.type_line("save");
-    until(&mut board, "ok", 60_000)?;
+    say(&mut board, "save", "ok")?;
     let (old, began) = (ask(&mut board, "version")?, board.time());
     let next = binary(&board, true);
     let said = update(&mut board, next)?.expect("no power was lost");
@@ -225,7 +212,7 @@ fn power_losses(count: u32, first_page: u32) -> Result<()> {
         }
         board.forgive();
         board.reset(Reset::Pin);
-        until(&mut board, "induction-drive", GREETING)?;
+        until_said(&mut board, "induction-drive")?;
         let at = operations - rng.random_range(0..if n < count { operations } else { 257 });
         lose_power(&mut board, &next, at)?;
         // Output after the loss is what follows the loader's bytes: confirmations (y) and a refusal of the operation without power.
@@ -273,7 +260,7 @@ fn fifty_losses_of_power_and_ten_in_the_first_page() -> Result<()> {
 #[test]
 fn an_image_of_another_board_is_not_written() -> Result<()> {
     let mut board = board()?;
-    until(&mut board, "last run: ", GREETING)?;
+    until_said(&mut board, "last run: ")?;
     let mut pty = Pty::open()?;
     let (mut port, _) = hil_sim::console::open(&pty.path.to_string_lossy(), 115_200)?;
     let host = std::thread::spawn(move || update::board_at(&mut port));

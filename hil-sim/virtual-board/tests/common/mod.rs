@@ -3,12 +3,13 @@
 pub mod program;
 pub mod script;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
+use drive_stream::client::{Answer, Client, Event};
 use hil_sim::Config;
 use virtual_board::{Board, Image, Options, Pair};
 
 /// Longest time from a reset to the greeting, and from a request to its answer, periods.
-const LONGEST: u64 = 30_000;
+const LONGEST: u64 = 60_000;
 
 /// Returns a started board with the image that was built last, together with its shadow.
 pub fn pair(config: &Config, seed: u64) -> Result<Pair> {
@@ -34,4 +35,44 @@ pub fn until_said(board: &mut Board, text: &str) -> Result<String> {
         }
     }
     bail!("no {text:?} in {said:?}")
+}
+
+/// Types a line after the console has finished its output; returns the output up to a line with this text.
+pub fn say(board: &mut Board, line: &str, until: &str) -> Result<String> {
+    board.run_periods(120)?;
+    board.take_console();
+    board.type_line(line);
+    until_said(board, until).context(line.to_owned())
+}
+
+/// Returns the answer to a request.
+pub fn ask(board: &mut Board, line: &str) -> Result<Answer> {
+    let (mut client, mut answer) = (Client::default(), None);
+    board.send(client.ask(line).as_bytes());
+    for _ in 0..LONGEST / 60 {
+        board.run_periods(60)?;
+        while board.next_period().is_some() {}
+        let said = board.take_console();
+        for event in said.bytes().filter_map(|byte| client.push(byte)) {
+            if let Event::Answer(whole) = event {
+                answer = Some(whole);
+            }
+        }
+        if said.ends_with('\n')
+            && let Some(answer) = answer
+        {
+            return Ok(answer);
+        }
+    }
+    bail!("no answer to {line:?}")
+}
+
+/// Runs for some periods, and checks after each that every gate is off.
+pub fn off_for(board: &mut Board, periods: u64) -> Result<()> {
+    for _ in 0..periods {
+        board.run_periods(1)?;
+        ensure!(!board.gates().any_on(), "a gate is on after {:.3} s", board.time());
+        while board.next_period().is_some() {}
+    }
+    Ok(())
 }
