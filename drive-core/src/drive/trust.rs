@@ -6,7 +6,6 @@ use Lock::{Baseline, Off, Watch};
 use Source::{Both, Injection, Nothing, Slip};
 
 use super::{Field, FluxPhase, Frame};
-use crate::flux::catch::Origin;
 use crate::flux::hand_over::Source;
 use crate::{AngleLoop, Coefficients};
 
@@ -59,7 +58,7 @@ impl<L: AngleLoop> Coefficients<L> {
         match (&s.flux, s.frame) {
             // Flying start: the shaft is searched; below, it was found, and at first the injection alone, then also the observer
             // rotates the frame.
-            (FluxPhase::Search(search), _) => Trust { source: Nothing, rotates: search.at.from != Origin::Fixed, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
+            (FluxPhase::Search(search), _) => Trust { source: Nothing, rotates: search.at.freq != 0.0, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
             // There is neither current nor flux.
             (FluxPhase::Asymmetry(_), _) => Trust { source: Slip, rotates: false, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
             (FluxPhase::Build { from, .. }, _) => match &self.flying_start {
