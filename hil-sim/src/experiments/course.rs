@@ -11,7 +11,7 @@ impl Ramp {
     }
 }
 
-/// What changes in a part beside the reference and the load.
+/// Change in a part, beside the reference and the load.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Change {
     /// Nothing.
@@ -37,7 +37,7 @@ pub struct Part {
     pub reference: Option<Ramp>,
     /// Torque of the load on the motor of the run, Nm, if the shaft is free.
     pub load_nm: f64,
-    /// What else changes.
+    /// The change, if there is one.
     pub change: Change,
     /// Duration, s.
     pub seconds: f64,
