@@ -819,13 +819,13 @@ def picture_observability():
     v.curve([(f, voltage_error(f, 0.1 * M.r_s)) for f in hz], BLUE, width=2.6)
     v.curve([(f, voltage_error(f, 0.01 * M.r_s)) for f in hz], BLUE, "6 4")
     v.curve([(f, voltage_error(f, d_volt=RESIDUAL)) for f in hz], ORANGE, width=2.6)
-    v.level(1.3, GREEN, None, 2)
+    v.level(1.4, GREEN, None, 2)
     v.upright(16, GREY)
     v.text(16, 0.5, "16 Hz", GREY, "end", dx=-4, dy=-7)
     v.text(7.5, 38, f"{cell(RESIDUAL, 1)} V", ORANGE)
     v.text(0.62, 21, "r_s + 10 %", BLUE)
     v.text(0.12, 4, "r_s + 1 %", BLUE)
-    v.text(0.11, 1.3, "injection, rms", GREEN, dy=-6)
+    v.text(0.11, 1.4, "injection, rms", GREEN, dy=-6)
     return p
 
 
