@@ -65,13 +65,13 @@ class Motor:
         self.r_s, self.r_r, self.l_m = m["r_s"], m["r_r"], m["l_m"]
         self.pairs, self.inertia = m["pole_pairs"], m["inertia"]
         self.l_s, self.l_r = m["l_ls"] + m["l_m"], m["l_lr"] + m["l_m"]
-        self.k = self.l_m / self.l_r
-        self.coupled = self.k * self.l_m  # L_M = L_m^2/L_r
+        self.k_r = self.l_m / self.l_r
+        self.coupled = self.k_r * self.l_m  # L_M = L_m^2/L_r
         self.sigma_ls = self.l_s - self.coupled
         self.sigma = self.sigma_ls / self.l_s
         self.tau = self.l_r / self.r_r
         self.alpha = 1 / self.tau
-        self.r_rotor = self.k**2 * self.r_r  # R_R
+        self.r_rotor = self.k_r**2 * self.r_r  # R_R
         plate = data["nameplate"]
         self.rated_nm = plate["power_w"] / (TAU / 60 * plate["speed_rpm"])
         self.dc_link = data["inverter"]["dc_link_v"]
@@ -973,9 +973,9 @@ def block_motor():
         [
             ["total leakage factor σ", "T3", cell(M.sigma, 4)],
             ["transient inductance σL_s", "T3", f"{cell(1e3 * M.sigma_ls, 2)} mH"],
-            ["coupling k = L_m/L_r", "T3", cell(M.k, 4)],
-            ["L_M = k L_m", "T4", f"{cell(1e3 * M.coupled, 2)} mH"],
-            ["R_R = k² r_r", "T4", f"{cell(M.r_rotor, 3)} Ω"],
+            ["coupling k_r = L_m/L_r", "T3", cell(M.k_r, 4)],
+            ["L_M = k_r L_m", "T4", f"{cell(1e3 * M.coupled, 2)} mH"],
+            ["R_R = k_r² r_r", "T4", f"{cell(M.r_rotor, 3)} Ω"],
             ["rotor time constant τ_r = 1/α", "T4", f"{cell(M.tau, 4)} s, α = {cell(M.alpha, 2)} /s"],
             ["flux ψ = L_M i_d at 0.7 A", "T8", f"{cell(M.coupled * I_D, 4)} Wb"],
             ["torque per ampere at 0.7 A", "T6", f"{cell(M.torque(I_D, 1), 3)} Nm/A"],
