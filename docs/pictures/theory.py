@@ -680,8 +680,8 @@ def picture_ellipse():
     ellipse = [at(cmath.exp(1j * a) + s * cmath.exp(-1j * a)) for a in span(0, TAU, 180)]
     p.line(24, y0, 452, y0, GREY, 1.2, arrow=True)
     p.line(x0, 416, x0, 12, GREY, 1.2, arrow=True)
-    p.text(452, y0 - 9, "d: rotor flux φ", GREY, "end", "s")
-    p.text(x0 + 8, 24, "q: injection axis θ = φ + 90°", GREY, style="s")
+    p.text(452, y0 - 9, "d: rotor flux φ (e = 0)", GREY, "end", "s")
+    p.text(x0 + 8, 24, "q: injection axis θ = φ̂ + 90°", GREY, style="s")
     p.path(circle, GREY, 1.5, "3 4")
     p.path(ellipse, BLUE, 2.4)
     # axis of the lower inductance
@@ -701,7 +701,7 @@ def picture_ellipse():
     x, y = at(current)
     p.line(x0, y, x, y, INK, 1.4, "3 3")
     p.text(x0 - 8, y - 6, "along: 1 − Re s", INK, "end", "s")
-    p.text(x + 30, y - 3, "across: Im s", INK, style="s")
+    p.text(x + 30, y - 3, "across: −Im s", INK, style="s")
     p.text(at(-0.92 + 0.33j)[0] - 6, at(0.33j)[1], "no saliency", GREY, "end", "s")
     p.text(132, 330, "injection current,", BLUE, "end", "s")
     p.text(132, 347, "all directions", BLUE, "end", "s")
@@ -710,7 +710,7 @@ def picture_ellipse():
 
 
 def picture_q():
-    p = Picture("theory-q", "Signal q over the angle error at 2 A: fast and lasting error, their slopes and zeros")
+    p = Picture("theory-q", "Signal q over the angle error at 2 A: fast error, lasting error and flux not yet settled, their slopes and zeros")
     i_q = 2.0
     gamma = math.atan2(i_q, I_D)
     v = p.panel((-90, 90), (-0.08, 0.2), range(-90, 91, 30), [-0.05, 0, 0.05, 0.1, 0.15, 0.2], "angle error e (° electrical)", "signal q", 300)
@@ -731,12 +731,12 @@ def picture_q():
     v.dot(0, ref)
     for zero in zeros(lambda e: q_fast(I_D, i_q, e) - ref, -1.5, -0.3):
         v.dot(zero * DEG, ref, ORANGE, hollow=True)
-    v.dot(low, ref, BLUE, hollow=True)
+    v.dot(low, q_slow(I_D, i_q, low / DEG), BLUE, hollow=True)
     for zero in zeros(lambda e: restoring(i_q, e), 0.8, 1.57):
         v.dot(zero * DEG, ref, BLUE, hollow=True)
     v.text(-88, 0.137, "fast error", ORANGE)
-    v.text(89, -0.057, "lasting, flux settled", BLUE, "end")
-    v.text(89, 0.06, "lasting, flux not yet settled", GREEN, "end")
+    v.text(89, -0.057, "lasting error", BLUE, "end")
+    v.text(89, 0.06, "flux not yet settled", GREEN, "end")
     v.text(low, 0.03, "flux gone", BLUE, "end", dx=-2, dy=10)
     return p
 
@@ -956,7 +956,7 @@ def table(heads, rows):
 
 
 def second_zeros(i_q):
-    """Second zeros, degrees: fast, lasting with the flux not settled, flux gone, lasting with the flux settled."""
+    """Second zeros, degrees: fast, flux not yet settled, flux gone (no zero, but the end of the curve), lasting."""
     ref = q_slow(I_D, i_q, 0)
     gamma = math.atan2(i_q, I_D)
     near = lambda found: [z * DEG for z in found if abs(z) > 0.02]
@@ -993,9 +993,9 @@ def block_offset():
         s = tensor(complex(I_D, i_q), 1)
         lasting, fast = slope(q_slow, i_q), slope(q_fast, i_q)
         rows.append(
-            [cell(i_q, 1), cell(math.atan2(i_q, I_D) * DEG, 1), cell(s.real, 4), cell(s.imag, 4), cell(signal(s), 4), cell(lasting, 4), cell(fast, 4), cell(fast / lasting, 2)]
+            [cell(i_q, 1), cell(math.atan2(i_q, I_D) * DEG, 1), cell(s.real, 4), cell(s.imag, 4), cell(signal(s), 4), cell(lasting, 4), cell(slope(q_slow, i_q, follows=False), 4), cell(fast, 4), cell(fast / lasting, 2)]
         )
-    return table(["i_q, A", "γ, °", "Re s", "Im s", "q_ref", "k lasting, 1/rad", "k fast, 1/rad", "fast / lasting"], rows)
+    return table(["i_q, A", "γ, °", "Re s", "Im s", "q_ref", "k lasting, 1/rad", "k flux not yet settled, 1/rad", "k fast, 1/rad", "fast / lasting"], rows)
 
 
 def block_zeros():
@@ -1004,7 +1004,7 @@ def block_zeros():
     for i_q in OFFSET_CURRENTS[1:]:
         fast, fixed, gone, settled = second_zeros(i_q)
         rows.append([cell(i_q, 1), join(fast), join(fixed), cell(gone, 1), join(settled)])
-    return table(["i_q, A", "fast", "lasting, flux not settled", "flux gone, γ − 90°", "lasting, flux settled"], rows)
+    return table(["i_q, A", "fast", "flux not yet settled", "flux gone, γ − 90°", "lasting"], rows)
 
 
 def block_barrier():
@@ -1031,7 +1031,7 @@ def block_false():
         flux, torque, e = fixed_frame(2.0, rpm)
         need = abs(restoring(2.0, e))
         need = 0.0 if need < 1e-6 else need
-        hidden = 2 * math.sqrt(max(0.0, mismatch(0.01) ** 2 - need**2)) / abs(2 * A_PSI)
+        hidden = math.sqrt(max(0.0, mismatch(0.01) ** 2 - need**2)) / abs(A_PSI)
         rows.append(
             [
                 cell(rpm, 0) + (f" ({name})" if name else ""),
@@ -1195,7 +1195,9 @@ def compute():
     n["mismatch_1"] = 100 * mismatch(0.01)
     n["warm_max"] = (math.atan(math.sqrt(1.3)) - math.atan(1 / math.sqrt(1.3))) * DEG
     n["drift_per_min"] = 0.01 / (M.tau * I_D) * DEG * 60 / M.pairs
-    n["half_volt"] = 2 * math.sin(math.radians(30) / 2) * M.coupled / M.tau
+    n["half_volt"] = M.r_rotor * math.sin(math.radians(30))
+    n["limit_ref_3a"] = 2 * B1 * I_D / (1 - A_PSI + 3 * B1)
+    n["early_15"], n["early_3"] = (slope(q_slow, i_q, follows=False) for i_q in (1.5, 3.0))
     n["rotating_leakage"] = 100 * B1 * 2.71 * math.sqrt(2)
     n["gamma_2a"] = math.atan2(2, I_D) * DEG
     return n
@@ -1214,14 +1216,26 @@ def quotes():
     low = min(x[3] for x in margins_of_the_table())
     return {
         "theory.md": [
-            f"changes the voltage by {n['half_volt']:.2f} V per ampere of q-axis current",
+            f"changes the voltage by {n['half_volt']:.2f} V per ampere of stator current",
             f"a residue of the dead time alone leaves {RESIDUAL:.1f} V",
             f"a = {cell(100 * A_PSI, 1)} % and b = {100 * B1:.1f} % per ampere",
             f"The angle γ is {n['gamma_2a']:.1f}°, (T17) gives s = {cell(n['re_s_2a'], 4)} + {n['im_s_2a']:.4f} j, (T18) gives q_ref = {n['ref_2a']:.4f}, "
             f"(T22) gives k = {cell(n['lasting_2a'], 4)} /rad, and (T23) gives k_fast = {cell(n['fast_2a'], 4)} /rad",
-            f"the formulas give {100 * q_slow(I_D, 2.0, 0):.2f} % and {100 * q_slow(I_D, 2.0, 10 / DEG):.2f} %",
+            f"The formulas give {100 * q_slow(I_D, 2.0, 0):.2f} % and {100 * q_slow(I_D, 2.0, 10 / DEG):.2f} %",
             f"a plant with {n['fast_15']:.1f} times the gain at 1.5 A",
             f"the fast one grows from {n['fast_0']:.2f} of it to {slope(q_fast, 3.0) / slope(q_slow, 3.0):.1f} times as much",
+            f"at 3 A this limit is {n['limit_ref_3a']:.4f}, and q_ref is {signal(tensor(complex(I_D, 3.0), 1)):.4f}",
+            f"At 1.5 A this is {cell(n['early_15'], 4)} /rad, which is {100 - 100 * n['early_15'] / slope(q_slow, 1.5):.0f} % less than the lasting "
+            f"{cell(slope(q_slow, 1.5), 4)} /rad. At 3 A it is {100 - 100 * n['early_3'] / slope(q_slow, 3.0):.0f} % less",
+            f"1/(2π τ_r) = {M.alpha / TAU:.2f} Hz sees (T22a). The default loop has {constant(SETTINGS, 'bandwidth_hz')} Hz",
+            f"(exactly at {zeros(lambda x: slope(q_fast, x) - slope(q_slow, x), 0.3, 1.5, 60)[0]:.2f} A)",
+            f"the lasting one stays within {math.ceil(max(abs(100 - 50 * slope(q_slow, x) / A_PSI) for x in OFFSET_CURRENTS))} % of 2a",
+            f"it is {cell(slope(q_slow, 0.0), 3)} to {cell(slope(q_slow, 3.0), 3)} /rad if the flux has settled, and {cell(slope(q_slow, 0.0), 3)} to "
+            f"{cell(n['early_3'], 3)} /rad before",
+            f"The second value is {-100 * 0.07 / slope(q_slow, 1.5) - 100:.1f} % larger in magnitude than the {cell(slope(q_slow, 1.5), 4)} /rad of (T22)",
+            f"for example +{fast_zero_slope(1.5):.3f} /rad at 1.5 A",
+            f"This is +{flux_gone(0.5):.2f} % at 0.5 A and +{flux_gone(1.0):.2f} % at 1 to 3 A",
+            f"the curve ends {flux_gone(2.0):.2f} % above q_ref",
             f"hence {n['mismatch_1']:.2f} % for g = 1 %",
             f"At 3 A a mismatch of {barrier(3.0)[0] / mismatch(0.01):.2f} % that the drive does not know is enough",
             f"an asymmetry of {100 * abs(restoring(2.0, fixed_frame(2.0, -150)[2])):.2f} % holds the frame",
@@ -1282,6 +1296,20 @@ def quotes():
             f"{100 * M.sigma * M.tau * 50e-6 * 375**2 / 2:.1f} % at 375 rad/s and 50 µs",
         ],
     }
+
+
+def fast_zero_slope(i_q, h=1e-5):
+    """Slope of a fast error at its second zero, 1/rad."""
+    at = second_zeros(i_q)[0][0] / DEG
+    return (q_fast(I_D, i_q, at + h) - q_fast(I_D, i_q, at - h)) / (2 * h)
+
+
+def flux_gone(i_q):
+    """q - q_ref where the flux is gone, %; the formula of the page must agree."""
+    value = restoring(i_q, math.atan2(i_q, I_D) - math.pi / 2)
+    s = tensor(complex(I_D, i_q), 1)
+    assert abs(value + A_PSI * signal(s) / (1 - s.real + A_PSI)) < 1e-9
+    return 100 * value
 
 
 def direction(degrees):
