@@ -1017,11 +1017,15 @@ def block_barrier():
     return table(["i_q, A", "barrier, %", "at e, °", "flux there, of nominal", "gain mismatch of this size, %"], rows)
 
 
+def flux_share(gamma, e):
+    """f of Eq. T19, with the flux settled."""
+    r = (math.cos(gamma - e) / math.cos(gamma)) ** 2
+    return 2 * r / (1 + r)
+
+
 def deficit(i_q, e):
     """Saliency deficit 1 − f cos 2e of a saliency that is fixed to the flux."""
-    gamma = math.atan2(i_q, I_D)
-    r = (math.cos(gamma - e) / math.cos(gamma)) ** 2
-    return 1 - 2 * r / (1 + r) * math.cos(2 * e)
+    return 1 - flux_share(math.atan2(i_q, I_D), e) * math.cos(2 * e)
 
 
 def block_false():
@@ -1046,6 +1050,56 @@ def block_false():
         )
     heads = ["shaft, rpm", "flux, of nominal", "e, °", "torque, Nm", "asymmetry that holds it, %", "as gain mismatch, %", "deficit 1 − f cos 2e", "least deficit shown at 1 % mismatch"]
     return table(heads, rows)
+
+
+def shown(i_q, rpm, gain, full):
+    """Deficit that the lock monitor computes in a false lock with this gain mismatch, Eq. T30.
+
+    With `full` the sensors turn the injection current i of Eq. T13 into i + n i*, without an approximation, and k is that of Eq. T22.
+    """
+    i = complex(I_D, i_q)
+    flux, _, e = fixed_frame(i_q, rpm)
+    n, rho = mismatch(gain), restoring(i_q, e)
+    if not full:
+        return deficit(i_q, e) + math.sqrt(max(0.0, n * n - rho * rho)) / A_PSI
+    s, s_ref = tensor(i, flux), tensor(i, 1)
+    # q of the measured current is q_ref on the line Re n' x + Im n' y = -rho; of its two points with |n'| = n, that with Re n' < 0
+    x, y = signal(s) + signal(s_ref), 1 - signal(s) * signal(s_ref)
+    size = math.hypot(x, y)
+    side = math.sqrt(max(0.0, n * n - (rho / size) ** 2)) / size
+    seen = complex(-rho * x / size**2 - side * y, -rho * y / size**2 + side * x) if gain else 0
+    along = lambda s: (1 - s.real) / (1 - abs(s) ** 2)
+    measured = along(s) * (1 - seen.real + seen.imag * signal(s)) if gain else along(s)
+    return (1 - (measured / along(s_ref)) ** 2) * -1 / slope(q_slow, i_q)
+
+
+def trip_rpm(i_q, gain, full=False):
+    """Shaft speed at which the deficit shown reaches the limit of the lock monitor."""
+    limit = constant(SETTINGS, "allowed_deficit")
+    rpm = lock_rpm(i_q)
+    while shown(i_q, rpm, gain, full) <= limit:
+        rpm -= 0.05
+    return rpm
+
+
+def never_trips(i_q):
+    """Least gain mismatch with which the deficit shown in full stays below the limit when the flux has gone."""
+    low, high = 0.0, 0.1
+    for _ in range(40):
+        g = 0.5 * (low + high)
+        low, high = (g, high) if shown(i_q, -1e6, g, True) > constant(SETTINGS, "allowed_deficit") else (low, g)
+    return high
+
+
+def block_trip():
+    rows = []
+    for i_q, gain in [(1.0, 0.0), (2.0, 0.0), (2.0, 0.01), (3.0, 0.0), (3.0, 0.0065)]:
+        row = [cell(i_q, 1), f"{100 * gain:g}"]
+        for full in (False, True):
+            rpm = trip_rpm(i_q, gain, full)
+            row += [cell(rpm, 0), cell(abs(fixed_frame(i_q, rpm)[0]), 2)]
+        rows.append(row)
+    return table(["i_q, A", "gain mismatch, %", "trips at, rpm, first order", "flux there, of nominal", "trips at, rpm, in full", "flux there, of nominal"], rows)
 
 
 def block_voltage():
@@ -1172,7 +1226,7 @@ def block_bias():
 
 
 BLOCKS = {
-    "theory.md": {"theory-motor": block_motor, "theory-offset": block_offset, "theory-zeros": block_zeros, "theory-barrier": block_barrier, "theory-false": block_false},
+    "theory.md": {"theory-motor": block_motor, "theory-offset": block_offset, "theory-zeros": block_zeros, "theory-barrier": block_barrier, "theory-false": block_false, "theory-trip": block_trip},
     "theory-observability.md": {"theory-voltage": block_voltage, "theory-resistance": block_resistance},
     "theory-source.md": {"theory-impedance": block_impedance, "theory-leak": block_leak, "theory-direct": block_direct},
     "theory-estimation.md": {"theory-chain": block_chain, "theory-filter": block_filter, "theory-alone": block_alone},
@@ -1198,6 +1252,7 @@ def compute():
     n["half_volt"] = M.r_rotor * math.sin(math.radians(30))
     n["limit_ref_3a"] = 2 * B1 * I_D / (1 - A_PSI + 3 * B1)
     n["early_15"], n["early_3"] = (slope(q_slow, i_q, follows=False) for i_q in (1.5, 3.0))
+    n["silent_n"] = (1 - constant(SETTINGS, "allowed_deficit")) * abs(A_PSI)
     n["rotating_leakage"] = 100 * B1 * 2.71 * math.sqrt(2)
     n["gamma_2a"] = math.atan2(2, I_D) * DEG
     return n
@@ -1236,6 +1291,13 @@ def quotes():
             f"for example +{fast_zero_slope(1.5):.3f} /rad at 1.5 A",
             f"This is +{flux_gone(0.5):.2f} % at 0.5 A and +{flux_gone(1.0):.2f} % at 1 to 3 A",
             f"the curve ends {flux_gone(2.0):.2f} % above q_ref",
+            f"gives {100 * min(map(first_order_barrier, OFFSET_CURRENTS[1:])):.0f} to {100 * max(map(first_order_barrier, OFFSET_CURRENTS[1:])):.0f} % less",
+            f"At the barrier at 2 A it asks for {100 * exact_share(2.0):.0f} % more than (T26)",
+            f"is {barrier(3.0)[0] / mismatch(0.01) / 1.5:.2f} % or {barrier(3.0)[0] / mismatch(0.01) / 0.5:.2f} %, depending",
+            f"The deficit at the barrier is {min(deficit(x, barrier(x)[1]) for x in OFFSET_CURRENTS[1:]):.2f} to "
+            f"{max(deficit(x, barrier(x)[1]) for x in OFFSET_CURRENTS[1:]):.2f}",
+            f"|n| exceeds {1 - constant(SETTINGS, 'allowed_deficit'):.2f} |a| = {100 * n['silent_n'] + 1e-9:.2f} %. This takes a mismatch of "
+            f"{n['silent_n'] / mismatch(1.0) * 100:.1f} %; in full it takes {100 * never_trips(2.0):.1f} % at 2 A",
             f"hence {n['mismatch_1']:.2f} % for g = 1 %",
             f"At 3 A a mismatch of {barrier(3.0)[0] / mismatch(0.01):.2f} % that the drive does not know is enough",
             f"an asymmetry of {100 * abs(restoring(2.0, fixed_frame(2.0, -150)[2])):.2f} % holds the frame",
@@ -1310,6 +1372,20 @@ def flux_gone(i_q):
     s = tensor(complex(I_D, i_q), 1)
     assert abs(value + A_PSI * signal(s) / (1 - s.real + A_PSI)) < 1e-9
     return 100 * value
+
+
+def first_order_barrier(i_q):
+    """Share by which Eq. T25 gives a lower barrier than Eq. T16 and T19."""
+    gamma = math.atan2(i_q, I_D)
+    first = max(abs(A_PSI * flux_share(gamma, e) * math.sin(2 * e)) for e in span(gamma - math.pi / 2, 0, 2000))
+    return 1 - first / barrier(i_q)[0]
+
+
+def exact_share(i_q):
+    """Share by which the exact condition asks for more asymmetry at the barrier than Eq. T26: there Re n' is 0."""
+    at = barrier(i_q)[1]
+    gamma = math.atan2(i_q, I_D)
+    return -tensor(complex(I_D, i_q), math.cos(gamma - at) / math.cos(gamma) * cmath.exp(1j * at)).real
 
 
 def direction(degrees):
