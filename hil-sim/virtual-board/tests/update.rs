@@ -1,6 +1,6 @@
 //! The check sum of the image, `update`, and ST's boot loader that it starts.
 
-use crate::common::{say, until_said};
+use crate::common::{until_said, until_within};
 use anyhow::{Result, ensure};
 use hil_sim::Config;
 use hil_sim::console::update;
@@ -21,7 +21,8 @@ fn board() -> Result<Board> {
 
 /// Returns the first output after a line.
 fn ask(board: &mut Board, line: &str) -> Result<String> {
-    say(board, line, "\n")
+    board.type_line(line);
+    until_within(board, "\n", 3000)
 }
 
 /// Returns the modes of all pins except PA2 and PA3.
@@ -43,7 +44,7 @@ fn a_damaged_image_does_not_start_and_says_so() -> Result<()> {
     board.reset(Reset::Pin);
     let untouched = modes(&mut board);
     let refused = |board: &mut Board, why: &str| -> Result<()> {
-        let said = until_said(board, "damaged")?;
+        let said = until_within(board, "damaged", 3000)?;
         ensure!(said.starts_with("error: the image is damaged: `update"), "{why}: {said}");
         let said = ask(board, "@7 status")?;
         ensure!(said.starts_with("error: the image is damaged"), "{why}: {said}");
@@ -145,7 +146,8 @@ fn a_loader_that_switches_a_gate_on_is_noticed() -> Result<()> {
 fn the_program_writes_another_image_and_keeps_the_settings() -> Result<()> {
     let mut board = unsupplied()?;
     ask(&mut board, "set speed.ramp_rpm_per_s 777")?;
-    say(&mut board, "save", "ok")?;
+    board.type_line("save");
+    until_within(&mut board, "ok", 60_000)?;
     let (old, began) = (ask(&mut board, "version")?, board.time());
     let next = binary(&board, true);
     let said = update(&mut board, next)?.expect("no power was lost");

@@ -9,7 +9,7 @@ use hil_sim::Config;
 use virtual_board::{Board, Image, Options, Pair};
 
 /// Longest time from a reset to the greeting, and from a request to its answer, periods.
-const LONGEST: u64 = 60_000;
+const LONGEST: u64 = 30_000;
 
 /// Returns a started board with the image that was built last, together with its shadow.
 pub fn pair(config: &Config, seed: u64) -> Result<Pair> {
@@ -25,8 +25,13 @@ pub fn regulating(seed: u64) -> Result<Pair> {
 
 /// Runs until the console prints a line with this text; returns all its output.
 pub fn until_said(board: &mut Board, text: &str) -> Result<String> {
+    until_within(board, text, LONGEST)
+}
+
+/// As [`until_said`], within this many periods.
+pub fn until_within(board: &mut Board, text: &str, periods: u64) -> Result<String> {
     let mut said = String::new();
-    for _ in 0..LONGEST / 60 {
+    for _ in 0..periods / 60 {
         board.run_periods(60)?;
         while board.next_period().is_some() {}
         said += &board.take_console();
