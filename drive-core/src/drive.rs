@@ -617,7 +617,7 @@ macro_rules! compiled_here {
             }
 
             /// Returns the present state.
-            #[inline(never)]
+            #[inline(never)] // one copy for all callers: 120 bytes less
             pub fn state(&self) -> State {
                 self.state_now()
             }
