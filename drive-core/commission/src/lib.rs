@@ -72,6 +72,7 @@ use num_complex::Complex32;
 
 pub use collector::{BINS, Bin, Collector, Record};
 pub use found::{Found, Leakage, Levels};
+pub use plate::{check_motor, contradiction};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
 use fit::{Fitted, Search};

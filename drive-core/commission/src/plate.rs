@@ -2,9 +2,9 @@
 
 use core::f32::consts::{SQRT_2, TAU};
 
-use super::report::Quantity;
+use super::report::{Quantity, Refusal, SIZE, TIME};
 use drive_core::{PERIOD_S, SQRT_3};
-use drive_settings::Settings;
+use drive_settings::{Nameplate, Settings};
 
 /// Plausible share of the shaft's power in the apparent power: efficiency times power factor.
 const POWER: (f32, f32) = (0.15, 0.95);
@@ -17,6 +17,9 @@ const LEAST_CURRENT: f32 = 0.3;
 
 /// Expected range of the rotor time constant, rated rad: 0.02 to 1.4 s at 60 Hz.
 const TAU_R: (f32, f32) = (7.5, 528.0);
+
+/// Least ratio of the q-axis and the d-axis current at rated load, which is slip times rotor time constant.
+const LEAST_LOAD: f32 = 0.5;
 
 /// Values that follow from the nameplate, the board and the settings in force: safe currents and expected ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,30 +64,24 @@ impl Plate {
     /// Computes the values of the settings.
     pub fn new(settings: &Settings) -> Self {
         let plate = &settings.nameplate;
-        let pairs = libm::roundf(60.0 * plate.frequency_hz / plate.speed_rpm).max(1.0);
         let safe = OF_RANGE * settings.sensor_range_a();
         let rated = settings.rated_a();
         let z_b = plate.base_impedance();
         let omega = TAU * plate.frequency_hz;
         let l_b = z_b / omega;
-        let apparent = SQRT_3 * plate.voltage_v * plate.current_a;
-        let synchronous = 60.0 * plate.frequency_hz / pairs;
-        let power = (POWER.0 * apparent, POWER.1 * apparent);
-        let speed = ((1.0 - SLIP.1) * synchronous, (1.0 - SLIP.0) * synchronous);
-        let current = (0.0, safe / (LEAST_CURRENT * SQRT_2));
-        let entries = [
-            Quantity::new("nameplate.power_w", "W", plate.power_w).allowing(power),
-            Quantity::new("nameplate.speed_rpm", "rpm", plate.speed_rpm).allowing(speed),
-            Quantity::new("nameplate.current_a", "A", plate.current_a).allowing(current),
-        ];
+        let largest_a = safe / (LEAST_CURRENT * SQRT_2);
+        // The rotor current is at least the one that carries the power at the rated voltage.
+        let largest_r_r = plate.slip() * plate.voltage_v * plate.voltage_v / plate.power_w;
+        let current =
+            Quantity::new("nameplate.current_a", "A", plate.current_a).allowing((0.0, largest_a));
         Self {
             amperes: rated.min(safe).min(settings.trip_a() / 1.15),
             z_b,
             leakage: (0.08 * l_b, 0.8 * l_b),
             r_s: (0.005 * z_b, 0.25 * z_b),
-            r_r: (0.001 * z_b, 0.1 * z_b),
-            tau_r: (TAU_R.0 / omega, TAU_R.1 / omega),
-            pole_pairs: pairs as u8,
+            r_r: (0.001 * z_b, largest_r_r.max(0.1 * z_b)),
+            tau_r: (TAU_R.0.min(LEAST_LOAD / plate.slip()) / omega, TAU_R.1 / omega),
+            pole_pairs: plate.pole_pairs(),
             pole_pairs_in_force: f32::from(settings.motor.pole_pairs),
             peak_v: SQRT_2 * plate.voltage_v,
             rated,
@@ -97,7 +94,7 @@ impl Plate {
             pulse_v: settings.share_of_dc_link(60.0),
             dead_time: settings.inverter.dead_time_s / settings.inverter.carrier_s(),
             dc_link: settings.inverter.dc_link_v,
-            implausible: entries.into_iter().find(|entry| !entry.is_allowed()),
+            implausible: power_and_speed(plate).into_iter().chain([current]).find(is_implausible),
         }
     }
 
@@ -109,4 +106,39 @@ impl Plate {
             Quantity::new("base impedance", "ohm", self.z_b),
         ]
     }
+}
+
+/// Returns power and speed of a nameplate, each with the range that the other entries allow.
+fn power_and_speed(plate: &Nameplate) -> [Quantity; 2] {
+    let apparent = SQRT_3 * plate.voltage_v * plate.current_a;
+    let synchronous = plate.synchronous_rpm();
+    let power = (POWER.0 * apparent, POWER.1 * apparent);
+    let speed = ((1.0 - SLIP.1) * synchronous, (1.0 - SLIP.0) * synchronous);
+    [
+        Quantity::new("nameplate.power_w", "W", plate.power_w).allowing(power),
+        Quantity::new("nameplate.speed_rpm", "rpm", plate.speed_rpm).allowing(speed),
+    ]
+}
+
+fn is_implausible(entry: &Quantity) -> bool {
+    !entry.is_allowed()
+}
+
+/// Returns why power or speed of a nameplate does not fit its other entries.
+pub fn contradiction(plate: &Nameplate) -> Option<Refusal> {
+    power_and_speed(plate).into_iter().find(is_implausible).map(Refusal::Plate)
+}
+
+/// Checks that the motor of these settings can have their nameplate, as the steps of the commissioning check what they find.
+///
+/// # Errors
+/// [`Refusal::Value`].
+pub fn check_motor(settings: &Settings) -> Result<(), Refusal> {
+    let (plate, motor) = (Plate::new(settings), &settings.motor);
+    let coupling = motor.l_m / (motor.l_m + motor.l_lr);
+    let r_r = coupling * coupling * motor.r_r;
+    Quantity::new("sigma L_s", "H", motor.sigma_l_s()).checked(plate.leakage, SIZE)?;
+    Quantity::new("r_s", "ohm", motor.r_s).checked(plate.r_s, SIZE)?;
+    Quantity::new("R_R", "ohm", r_r).checked(plate.r_r, SIZE)?;
+    Quantity::new("tau_r", "s", motor.tau_r()).checked(plate.tau_r, TIME).map(|_| ())
 }

@@ -73,8 +73,8 @@ pub struct Report {
 pub enum Refusal {
     /// An entry of the nameplate is implausible beside the others.
     #[error(
-        "{} = {} {}: with the rest of the nameplate {:.4} to {:.4} is plausible",
-        .0.name, .0.value, .0.unit, .0.allowed.0, .0.allowed.1
+        "{} = {} {}: the rest of the nameplate allows {:.1} to {:.1}{}",
+        .0.name, .0.value, .0.unit, .0.allowed.0, .0.allowed.1, no_slip(.0)
     )]
     Plate(Quantity),
     /// A measured value that cannot belong to a motor with this nameplate.
@@ -115,6 +115,12 @@ pub enum Refusal {
     /// Samples were missing in the evaluation.
     #[error("samples were lost; repeat it")]
     SamplesLost,
+}
+
+/// Advice for a speed at which the slip is missing.
+fn no_slip(entry: &Quantity) -> &'static str {
+    let is_synchronous = entry.name == "nameplate.speed_rpm" && entry.value > entry.allowed.1;
+    if is_synchronous { "; it shows no slip: enter 1 to 5 % less" } else { "" }
 }
 
 /// Letter of a phase by its number.

@@ -166,6 +166,22 @@ impl Nameplate {
     pub fn base_impedance(&self) -> f32 {
         self.voltage_v / (SQRT_3 * self.current_a)
     }
+
+    /// Returns the number of pole pairs: the largest one whose synchronous speed is not below the rated speed. A speed that is up to 0.02 of
+    /// a pole pair too high counts as synchronous, because some nameplates show no slip.
+    pub fn pole_pairs(&self) -> u8 {
+        (60.0 * self.frequency_hz / self.speed_rpm + 0.02).max(1.0) as u8
+    }
+
+    /// Returns the synchronous speed, rpm.
+    pub fn synchronous_rpm(&self) -> f32 {
+        60.0 * self.frequency_hz / f32::from(self.pole_pairs())
+    }
+
+    /// Returns the slip at rated speed.
+    pub fn slip(&self) -> f32 {
+        1.0 - self.speed_rpm / self.synchronous_rpm()
+    }
 }
 
 /// Rules and ranges that are longer than a line.
