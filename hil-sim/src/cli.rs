@@ -14,6 +14,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::board;
 use crate::coefficients;
+use crate::config;
 use crate::console;
 use crate::experiments;
 use crate::first_light;
@@ -57,6 +58,10 @@ enum Command {
     Motors {
         /// Name of the motor, or a file that ends in .toml or .json
         name: Option<String>,
+        /// Print a motor file made from a nameplate, such as "750 W, 400 V, 1.86 A, 50 Hz, 1400 rpm"; circuit and dc link
+        /// are estimated and marked
+        #[arg(long, value_name = "TEXT", conflicts_with_all = ["name", "json"])]
+        plate: Option<String>,
         /// Print a JSON list
         #[arg(long)]
         json: bool,
@@ -144,7 +149,12 @@ pub fn main() -> ExitCode {
             run::run(&Request { name: experiments::DEFAULT.into(), input, ..Request::default() })
         }
         Some(Command::List { lab, json }) => lists::experiments(json, lab).and_then(say),
-        Some(Command::Motors { name, json }) => lists::motors(name.as_deref(), json).and_then(say),
+        Some(Command::Motors { plate: Some(plate), .. }) => {
+            config::plate::motor_file(&plate).and_then(say)
+        }
+        Some(Command::Motors { name, json, .. }) => {
+            lists::motors(name.as_deref(), json).and_then(say)
+        }
         Some(Command::Keys { prefix, toml, input }) => {
             lists::keys(prefix.as_deref(), toml, &input).and_then(say)
         }

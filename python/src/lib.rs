@@ -23,7 +23,9 @@ use config::Config;
 #[pymodule]
 mod induction_drive {
     #[pymodule_export]
-    use super::{commission, config::Config, drive::Drive, plant::Plant, rig::Rig, run};
+    use super::{
+        commission, config::Config, drive::Drive, motor_file, plant::Plant, rig::Rig, run,
+    };
     /// Control period, s.
     #[pymodule_export]
     const PERIOD_S: f64 = 1.0 / hil_sim::rig::RATE_HZ;
@@ -62,6 +64,13 @@ fn run<'py>(
     let options = hil_sim::input::Input { seed, seconds, quiet: true, ..options };
     let json = py.detach(|| cli::json(experiment, input, options)).map_err(raised)?;
     py.import("json")?.call_method1("loads", (json,))
+}
+
+/// Returns the text of a motor file, for `Config(motor=FILE)`, made from a nameplate such as `750 W, 400 V, 1.86 A, 50 Hz, 1400 rpm`.
+/// Circuit and dc link are estimated, and marked as such.
+#[pyfunction]
+fn motor_file(nameplate: &str) -> PyResult<String> {
+    hil_sim::config::plate::motor_file(nameplate).map_err(raised)
 }
 
 /// Commissions the motor of a configuration at rest, with a drive that knows its nameplate, and returns the results and the settings that

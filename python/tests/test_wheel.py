@@ -46,6 +46,15 @@ def test_torque_steps_are_those_of_the_program(seed):
     assert json.dumps(ours) == json.dumps(theirs)
 
 
+def test_a_nameplate_is_a_motor(tmp_path):
+    file = tmp_path / "motor.toml"
+    file.write_text(drive.motor_file("750 W, 400 V, 1.86 A, 50 Hz, 1400 rpm"))
+    run = drive.run("torque-steps", drive.Config(motor=str(file)))
+    assert run["metrics"]["angle_error_max_deg"] < 8 and "estimated" in " ".join(run["remarks"])
+    with pytest.raises(ValueError, match="nameplate.power_w = 7500"):
+        drive.motor_file("7500 W, 400 V, 1.86 A, 50 Hz, 1400 rpm")
+
+
 @pytest.mark.parametrize("plant", ["a", "r"])
 def test_a_rig_has_the_bits_of_a_scenario_of_the_program(tmp_path, plant):
     file = tmp_path / "run.toml"

@@ -13,12 +13,15 @@ mod keys;
 pub mod motors;
 pub mod passport;
 mod plant;
+pub mod plate;
 mod value;
 mod words;
 
+use std::f32::consts::TAU;
 use std::path::Path;
 
-use drive_core::{Coefficients, Line};
+use drive_core::{Coefficients, Line, PERIOD_S};
+use drive_settings::rules::CARRIER_HZ;
 use drive_settings::{Settings, SettingsError, find, value as drive};
 
 use file::FileAssignment;
@@ -117,6 +120,17 @@ impl Config {
     /// Scales a current in proportion to the rated current; `on_reference`, A, is its value on the dissertation's motor.
     pub fn amperes(&self, on_reference: f64) -> f64 {
         on_reference * self.relative(Settings::rated_a)
+    }
+
+    /// Scales the range of the current sensors. It holds the rated current, the injection current at the dissertation's share of the dc link,
+    /// 50 of 311 V, and the ripple of the PWM.
+    pub fn sensed(&self, on_reference: f64) -> f64 {
+        let peak = |s: &Settings| {
+            let injection = s.share_of_dc_link(50.0) / (TAU * CARRIER_HZ);
+            let ripple = s.inverter.dc_link_v * PERIOD_S / 8.0;
+            s.rated_a() + (injection + ripple) / s.motor.sigma_l_s()
+        };
+        on_reference * self.relative(peak)
     }
 
     /// Scales a load torque; `on_reference`, Nm, is its value on the dissertation's motor. A load step of the result

@@ -180,7 +180,8 @@ fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
     let (mut objects, mut lost) = (Vec::new(), Ok(()));
     for experiment in chosen {
         let context = Context { file, ..Context::new(&config, input.seed, input.progress()) };
-        let Some(outcome) = part.run(experiment, &context, input.quiet)? else { continue };
+        let Some(mut outcome) = part.run(experiment, &context, input.quiet)? else { continue };
+        outcome.remarks.extend(input.remark()?);
         let command = match file {
             Some(_) if own.is_some() => format!("run {name}"),
             Some(file) => format!("run {} --input {}", experiment.name, file.display()),

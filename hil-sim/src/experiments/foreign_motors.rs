@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use std::f64::consts::{SQRT_2, TAU};
 
 use drive_commission::Refusal;
-use drive_settings::tuning::bisected;
 use drive_settings::{Flux, SettingsError};
 
 use super::battery::{Kind, Refused, Summary, Trial, allowed_a, disturbed, nominal_limit_a, trial};
 use super::commission::{Outside, Session, unaware};
 use super::drawn_machine::Circuit;
 use super::saliency::Probe;
+use crate::config::plate::rated;
 use crate::prelude::*;
 use crate::stats::exact;
 
@@ -83,22 +83,6 @@ fn by_plate(error: &SettingsError) -> bool {
 
 fn is_named(state: State) -> bool {
     state.fault().is_some_and(|fault| !UNNAMED.contains(&fault))
-}
-
-/// Returns the slip at which a circuit, in units of its plate's impedance, takes the rated current, and the shaft power
-/// there relative to the apparent power.
-fn rated([r_s, r_r, x_s, x_r, x_m]: [f64; 5]) -> (f64, f64) {
-    let impedance = |slip: f64| {
-        let (r, x) = (r_r / slip, x_m + x_r);
-        let share = x_m / (r * r + x * x);
-        (share * x_m * r, r_s + share * x_m * r, x_s + share * (r * r + x_r * x))
-    };
-    let is_below = |slip: f64| {
-        let (_, re, im) = impedance(slip);
-        re.hypot(im) > 1.0
-    };
-    let (slip, _) = bisected((1e-5, 1.0), 50, &is_below);
-    (slip, (1.0 - slip) * impedance(slip).0)
 }
 
 /// Returns a random motor with its inverter and sensors. The nameplate is log-uniform over its range. The circuit is in

@@ -9,7 +9,7 @@ use include_dir::{Dir, include_dir};
 use serde::{Deserialize, Serialize};
 
 use super::passport::Passport;
-use super::{Config, Key, Value, alias, flattened};
+use super::{Config, Key, Value, alias, flattened, plate};
 use crate::bounded;
 use crate::error::{Error, cut, parser_text};
 
@@ -17,6 +17,7 @@ use crate::error::{Error, cut, parser_text};
 static FILES: Dir<'static> = include_dir!("$MOTORS");
 
 /// Keys that a user's motor file must set, because no rule gives them and no value of another motor may replace them.
+/// A file that states only the nameplate is completed by [`plate`].
 pub const NEEDED: &str = "nameplate.power_w nameplate.voltage_v nameplate.current_a nameplate.frequency_hz nameplate.speed_rpm \
     motor.r_s motor.r_r motor.l_ls motor.l_lr motor.l_m motor.pole_pairs inverter.dc_link_v";
 
@@ -44,7 +45,7 @@ pub struct Source {
 }
 
 /// A motor with the inverter and the sensors that suit it.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motor {
     /// Name on the command line. For a motor that comes with the program it is the name of the file; for a user's file
     /// it ends in `.toml`, for a passport in `.json`.
@@ -83,7 +84,7 @@ impl Motor {
             let text = bounded::text(path).map_err(|e| failed(e.to_string()))?;
             return match name.ends_with(".json") {
                 true => Passport::parse(&text).map(|it| of_passport(name, it)).map_err(failed),
-                false => parse(name, &text).map_err(|e| failed(parser_text(e))),
+                false => parse(name, &text).map_err(|e| failed(parser_text(e)))?.completed(),
             };
         }
         let all = Self::all();
@@ -95,9 +96,33 @@ impl Motor {
     /// Parses a motor from the text of a motor file.
     ///
     /// # Errors
-    /// [`Error::Refused`] if the text is not a motor file.
+    /// [`Error::Refused`] if the text is not a motor file, or as [`plate::circuit`].
     pub fn from_text(name: &str, text: &str) -> Result<Self, Error> {
-        parse(name, text).map_err(|e| Error::Refused(parser_text(e)))
+        parse(name, text).map_err(|e| Error::Refused(parser_text(e)))?.completed()
+    }
+
+    /// Adds circuit and dc link, estimated, to a user's file that states only the nameplate.
+    fn completed(mut self) -> Result<Self, Error> {
+        if !self.is_own() || !NEEDED.split(' ').all(|key| self.says(key) == of_plate(key)) {
+            return Ok(self);
+        }
+        let mut config = Config::default();
+        let of_plate = self.settings().into_iter().filter(|(key, _)| of_plate(key));
+        of_plate.into_iter().try_for_each(|(key, value)| config.set(&key, &value))?;
+        let estimated = plate::circuit(&config.drive.nameplate)?;
+        let keys = estimated.each_ref().map(|(key, _)| (*key).to_owned()).to_vec();
+        for (key, value) in estimated {
+            let (group, name) = key.split_once('.').unwrap_or_default();
+            let group = self.settings.entry(group).or_insert_with(|| toml::Table::new().into());
+            group.as_table_mut().map(|group| group.insert(name.to_owned(), value.into()));
+        }
+        self.source.push(Source { keys, from: plate::ESTIMATED.to_owned(), unverified: true });
+        Ok(self)
+    }
+
+    /// Whether circuit and dc link are estimated from the nameplate.
+    pub fn is_estimated(&self) -> bool {
+        self.source.iter().any(|source| source.from == plate::ESTIMATED)
     }
 
     /// Returns the keys that the file sets, with their values.
@@ -121,14 +146,8 @@ impl Motor {
     /// As [`Config::set`]. [`Error::Refused`] if a number of a motor that comes with the program has no source or two
     /// sources, or if a user's file does not set all [`NEEDED`] keys.
     pub fn apply(&self, config: &mut Config) -> Result<(), Error> {
-        let (settings, name) = (self.settings(), &self.name);
-        let missing: Vec<_> =
-            NEEDED.split(' ').filter(|key| self.is_own() && !self.says(key)).collect();
-        if !missing.is_empty() {
-            let missing = missing.join(", ");
-            return Err(Error::Refused(format!("motor {name}: these are missing: {missing}")));
-        }
-        for (key, value) in settings {
+        let name = &self.name;
+        for (key, value) in self.settings() {
             let sources = self.source.iter().flat_map(|source| &source.keys);
             let count = sources.filter(|known| **known == key).count();
             if count > 1 || count == 0 && !self.is_own() {
@@ -136,6 +155,15 @@ impl Motor {
                 return Err(Error::Refused(format!("motor {name}: {why}")));
             }
             config.set(&key, &value)?;
+        }
+        let missing: Vec<_> =
+            NEEDED.split(' ').filter(|key| self.is_own() && !self.says(key)).collect();
+        if !missing.is_empty() {
+            let missing = missing.join(", ");
+            return Err(Error::Refused(format!("motor {name}: these are missing: {missing}")));
+        }
+        if self.is_own() {
+            plate::check(config)?;
         }
         self.implied(config).into_iter().try_for_each(|(key, value, _)| config.set(key, &value))
     }
@@ -151,7 +179,7 @@ impl Motor {
         let (base, four_digits) = (Config::default(), |value: f64| {
             Value::Number(format!("{value:.3e}").parse().unwrap_or(value))
         });
-        let range_a = four_digits(config.amperes(base.measurement.range_a));
+        let range_a = four_digits(config.sensed(base.measurement.range_a));
         let inertia = four_digits(base.motor.inertia * config.rated_nm() / base.rated_nm());
         let flux = if self.says("sequence.i_d") { "sequence.i_d" } else { "sequence.flux" };
         let word = |word: &str| Value::Word(word.to_owned());
@@ -159,7 +187,11 @@ impl Motor {
         let all = [
             ("current_plant", word("motor"), commissioned),
             (flux, word("high"), commissioned),
-            ("measurement.range_a", range_a, "by rule: 1.24 times the rated current, peak"),
+            (
+                "measurement.range_a",
+                range_a,
+                "by rule: rated current, injection and ripple, and 12 %",
+            ),
             ("motor.inertia", inertia, "assumed: in proportion to the rated torque"),
             ("prepare.learn", Value::Switch(true), "by rule: the drive has not learned this motor"),
         ];
@@ -181,6 +213,11 @@ impl Motor {
             .map(|key| format!("set {} {}", key.name(), key.get(&config)))
             .collect()
     }
+}
+
+/// Whether a key belongs to the nameplate.
+fn of_plate(key: &str) -> bool {
+    key.starts_with("nameplate.")
 }
 
 /// Whether a motor of this name is a user's file.
