@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};
 
+use hil_sim::Config;
 use hil_sim::config::motors::Motor;
 use hil_sim::experiments::{EXPERIMENTS, WITH_INPUT};
 use serde::{Deserialize, Serialize};
@@ -222,7 +223,7 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
         blocks.filter(|block| block.contains("-p hil-sim documents) -->")).collect::<Vec<_>>()
     };
     let mut known: Vec<_> = results().into_iter().map(|(name, _)| name).collect();
-    known.extend(["experiments", "motors-list", "budgets"].map(str::to_owned));
+    known.extend(["experiments", "motors-list", "injection", "budgets"].map(str::to_owned));
     for block in pages().values().flat_map(mine) {
         let name = block.split(' ').next().unwrap();
         assert!(known.iter().any(|known| known == name), "nothing renders the block {name}");
@@ -251,6 +252,22 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
         writeln!(list, "| `{}` | {} | {unverified} |", motor.name, motor.title).unwrap();
     }
     generated::check("motors.md", "motors-list", &list);
+    let mut list = "| motor | injected voltage, V | current, A | of the rated current, % | torque ripple, Nm | of the rated torque, % |\n\
+                    |---|---|---|---|---|---|\n"
+        .to_owned();
+    for Motor { name, .. } in Motor::all() {
+        let config = Config::of_motor(Some(&name)).unwrap();
+        let (volts, amperes) = (config.drive.carrier_v(), config.drive.injection_a());
+        let (nm, of_current) =
+            (config.drive.injection_nm(), 100.0 * amperes / config.drive.rated_a());
+        let of_torque = 100.0 * f64::from(nm) / config.rated_nm();
+        writeln!(
+            list,
+            "| `{name}` | {volts:.1} | {amperes:.3} | {of_current:.0} | {nm:.3} | {of_torque:.0} |"
+        )
+        .unwrap();
+    }
+    generated::check("noise.md", "injection", &list);
     let mut list = "| budget | limit |\n|---|---|\n".to_owned();
     for (file, unit) in [("xtask/budgets.toml", "cycles"), ("src/images/full.toml", "bytes")] {
         let budgets = fs::read_to_string(generated::root().join(file)).unwrap();

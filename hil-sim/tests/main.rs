@@ -20,6 +20,7 @@ mod generated;
 mod hazards;
 mod identification_tables;
 mod identify_trace;
+mod injection_torque;
 mod keys_used;
 mod measured_motors;
 mod no_debug_text;

@@ -124,10 +124,13 @@ fn motor_text(motor: &Motor) -> Result<String, Error> {
     let Motor { name, title, about, .. } = motor;
     let (about, table) = (about.trim(), report::table(&table));
     let (m, carrier) = (config.drive.motor, config.drive.carrier_v());
+    let (amperes, nm) = (config.drive.injection_a(), config.drive.injection_nm());
+    let percent = 100.0 * f64::from(nm) / config.rated_nm();
     let (leakage, tau_r) = (1e3 * m.sigma_l_s(), 1e3 * m.tau_r());
     let lines = motor.console_lines().join("\n");
     Ok(format!(
         "{name}: {title}\n\n{about}\n\n{table}\nLeakage inductance {leakage:.4} mH, rotor time constant {tau_r:.0} ms, \
-         injected voltage {carrier:.1} V.\n\nAt the console, with the scales of your board:\n{lines}\n"
+         injected voltage {carrier:.1} V.\nTorque ripple of the injection at standstill: {nm:.3} Nm at 600 Hz, {percent:.0} % of the \
+         rated torque, by a current of {amperes:.3} A.\n\nAt the console, with the scales of your board:\n{lines}\n"
     ))
 }

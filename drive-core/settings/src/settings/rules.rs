@@ -270,7 +270,7 @@ impl Settings {
 
     /// Returns `injection.amplitude_v` by its rule, which the setting explains.
     pub(super) fn carrier_rule(&self) -> f32 {
-        let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
+        let reactance = self.carrier_reactance();
         let of_i_d = CARRIER_OF_I_D * self.i_d();
         let by_noise = f32::min(of_i_d, self.share_of_rated(0.463)) * reactance;
         let of_link = self.share_of_dc_link(50.0);
@@ -278,6 +278,22 @@ impl Settings {
         let room = CARRIER_OF_ROOM * (self.trip_a() - self.current_limit_a());
         let most = f32::min(f32::max(0.5 * self.i_d() * reactance, of_link), room * reactance);
         f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
+    }
+
+    fn carrier_reactance(&self) -> f32 {
+        TAU * CARRIER_HZ * self.motor.sigma_l_s()
+    }
+
+    /// Returns the amplitude of the injection current at the full injection voltage, A. Resistances are neglected: they make it less than 2 %
+    /// smaller.
+    pub fn injection_a(&self) -> f32 {
+        self.carrier_v() / self.carrier_reactance()
+    }
+
+    /// Returns the amplitude of the torque that the injection current causes at 600 Hz, Nm. The rotor flux is constant during an injection
+    /// period, because the rotor time constant is much longer.
+    pub fn injection_nm(&self) -> f32 {
+        self.motor.torque_per_ampere(self.i_d()) * self.injection_a()
     }
 
     /// Returns the plant of the d axis for the design of its current controller. The rule is the plant that was identified
