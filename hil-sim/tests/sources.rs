@@ -5,9 +5,9 @@ use std::sync::LazyLock;
 use hil_sim::Config;
 use hil_sim::experiments::source::errata::{ERRATA, OWN};
 use hil_sim::experiments::source::evidence::Evidence;
-use hil_sim::experiments::source::{PRINTED, Verdict, number, place_of};
+use hil_sim::experiments::source::{Class, PRINTED, number, place_of, value_of};
 use hil_sim::experiments::{self, SOURCES};
-use hil_sim::outcome::Compared;
+use hil_sim::outcome::{Against, Compared};
 
 use crate::generated;
 
@@ -24,11 +24,58 @@ static EVIDENCE: LazyLock<Evidence> = LazyLock::new(|| {
 #[ignore = "a table of the documents: cargo xtask test"]
 fn every_printed_value_has_a_verdict_and_the_errata_hold() {
     assert_eq!(EVIDENCE.faults(), Vec::<String>::new());
-    // Verdicts: equal, equal but for unit or rounding, differs, unknown, statistics, none.
-    for (source, counts) in [("S1", [203, 52, 27, 32, 0, 0]), ("S0", [23, 0, 3, 22, 186, 0])] {
-        assert_eq!(EVIDENCE.count(source, None), counts, "{source}");
-    }
-    assert_eq!(place_of("S1", "Eq. 3.20", "k_FT").map(|k| EVIDENCE.verdict(k).number()), Some(2));
+    // Verdicts: equal, equal but for unit or last digits, input, differs, unknown, within the spread over seeds, none.
+    let against = [Against::Nothing, Against::Print, Against::Program, Against::Simulation];
+    let counts = ["S1", "S0"].map(|source| against.map(|one| EVIDENCE.count(source, Some(one))));
+    let s1 = [
+        [0, 0, 50, 0, 2, 0, 0],
+        [92, 7, 0, 23, 0, 0, 0],
+        [34, 37, 0, 6, 0, 0, 0],
+        [20, 0, 0, 13, 30, 0, 0],
+    ];
+    let s0 = [
+        [0, 0, 0, 0, 10, 0, 0],
+        [9, 0, 0, 2, 0, 0, 0],
+        [10, 0, 0, 0, 0, 0, 0],
+        [4, 0, 0, 137, 12, 50, 0],
+    ];
+    assert_eq!(counts, [s1, s0]);
+    let k_ft = place_of("S1", "Eq. 3.20", "k_FT").expect("Eq. 3.20");
+    assert_eq!(EVIDENCE.verdict(k_ft).0, Class::Differs);
+}
+
+/// Returns the verdict on a value that stands beside a printed value of a source, together with the formula of the list.
+fn verdict(ours: &Compared) -> Class {
+    let mut outcome = hil_sim::Outcome::default();
+    outcome.compared.push(ours.clone());
+    let mut evidence = Evidence::default();
+    evidence.add("one", &outcome);
+    evidence.verdict(place_of(ours.source, &ours.place, &ours.quantity).expect("in the list")).0
+}
+
+#[test]
+fn a_verdict_looks_at_each_value_to_half_a_unit_of_the_last_digit() {
+    let of = |quantity: &str| Compared::with("S1", "section 3.6.2", quantity);
+    // 8.37 is printed, and the formula of the list gives 8.3653.
+    assert_eq!(verdict(&of("|z_rb|").simulated(8.374)), Class::Equal);
+    assert_eq!(verdict(&of("|z_rb|").simulated(8.376)), Class::None);
+    // An input that a run takes from the list is judged by what the simulation reads.
+    let differs = verdict(&of("theta_rb").simulated(0.733));
+    assert_eq!(differs, Class::Differs);
+    // A mean of random runs: 34.484 is printed.
+    let mean = |ends| {
+        let ours = Compared::with("S0", "Table 2, B, r_s", "Sg 50 us").simulated(30.0);
+        verdict(&Compared { seeds: Some(ends), ..ours })
+    };
+    assert_eq!(mean([25.0, 35.0]), Class::WithinSpread);
+    assert_eq!(mean([25.0, 34.0]), Class::Differs);
+}
+
+#[test]
+fn a_comparison_is_neither_true_nor_false_by_construction() {
+    let holds = ["1 < 2", "2 < 2", "3 - 1 > 2*0.9", "abs(sin(PI/4) - sin(3*PI/4)) > 0.001"];
+    let value = |formula| value_of("S1", formula);
+    assert_eq!(holds.map(value), [Some(1.0), Some(0.0), Some(1.0), Some(0.0)]);
 }
 
 /// Values that were typed from the sources a second time, by hand.
@@ -76,17 +123,10 @@ fn a_wrong_constant_is_seen() {
         [("section 3.6.3", "L_m"), ("Table 7, i = 3", "a (LPF)"), ("Eq. 3.44", "z_s")]
     {
         let ours = compared(place, quantity);
-        let number = place_of("S1", place, quantity).expect(place);
-        let verdict = |used: f64| {
-            let mut outcome = hil_sim::Outcome::default();
-            outcome.compared.push(ours.clone().used(used));
-            let mut evidence = Evidence::default();
-            evidence.add("one", &outcome);
-            evidence.verdict(number)
-        };
+        let verdict = |used: f64| verdict(&ours.clone().used(used));
         let used = ours.used.expect("a constant of the program");
-        assert_ne!(verdict(used), Verdict::None, "{place}");
-        assert_eq!(verdict(1.01 * used), Verdict::None, "{place}");
+        assert_ne!(verdict(used), Class::None, "{place}");
+        assert_eq!(verdict(1.01 * used), Class::None, "{place}");
     }
     assert_eq!(number("S1", "Table 2, U_0", "v_a"), 2.0 / 3.0);
 }

@@ -111,6 +111,28 @@ pub struct Step {
     pub angle_error_mean_deg: f64,
 }
 
+/// The origin of the value that stands beside a printed one, weakest first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Against {
+    /// There is no such value.
+    #[default]
+    Nothing,
+    /// The source's own numbers alone: no change of the program can make it differ.
+    Print,
+    /// A constant, a filter, a design or a method of the program.
+    Program,
+    /// The drive, or the method of the source, on the simulated motor.
+    Simulation,
+}
+
+impl Against {
+    /// Returns its name on the page.
+    pub fn name(self) -> &'static str {
+        ["nothing", "print", "program", "simulation"][self as usize]
+    }
+}
+
 /// A printed value of a source beside ours, in the printed unit.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Compared {
@@ -120,10 +142,12 @@ pub struct Compared {
     pub place: String,
     /// Its symbol or name.
     pub quantity: String,
-    /// Value computed from the source's own numbers.
+    /// Value computed without a simulation: from the source's own numbers, or by the program.
     pub recomputed: Option<f64>,
     /// Value from the drive, or from the method of the source, on the simulated motor.
     pub simulated: Option<f64>,
+    /// The strongest origin of these values.
+    pub against: Against,
     /// Smallest and largest value over seeds, of a mean over random runs.
     pub seeds: Option<[f64; 2]>,
     /// The constant that the program uses for it.
@@ -149,22 +173,28 @@ impl Compared {
         Self { unknown: Some(what), ..self }
     }
 
-    /// Adds the value from the source's own numbers, or whether a claim holds by them.
+    /// Adds the value from the source's own numbers alone, or whether a claim holds by them.
+    pub fn of_print(self, value: impl Into<f64>) -> Self {
+        let against = self.against.max(Against::Print);
+        Self { recomputed: Some(value.into()), against, ..self }
+    }
+
+    /// Adds the value that the program computes, or whether a claim holds by it.
     pub fn recomputed(self, value: impl Into<f64>) -> Self {
-        Self { recomputed: Some(value.into()), ..self }
+        Self { against: Against::Program, ..self.of_print(value) }
     }
 
     /// Adds the constant that the program uses.
     pub fn used(self, value: f64) -> Self {
-        Self { used: Some(value), ..self }
+        Self { used: Some(value), against: self.against.max(Against::Program), ..self }
     }
 
     /// Adds the value from the simulated motor, or whether a claim holds for it.
     pub fn simulated(self, value: impl Into<f64>) -> Self {
-        Self { simulated: Some(value.into()), ..self }
+        Self { simulated: Some(value.into()), against: Against::Simulation, ..self }
     }
 
-    /// Returns the value to be judged: the recomputed one, otherwise the simulated one, otherwise the constant of the program.
+    /// Returns the value that an erratum shows: the recomputed one, otherwise the simulated one, otherwise the constant of the program.
     pub fn value(&self) -> Option<f64> {
         self.recomputed.or(self.simulated).or(self.used)
     }

@@ -43,10 +43,6 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("gain_mismatch", mismatch);
     let figure = texts::figure("adc-calibration", "calibration");
     outcome.figures.push(figure.panel(readings).panel(residuals));
-    outcome.remarks.push(format!(
-        "The two channels differ by {:.2} % in gain before calibration. A mismatch of 1 % costs a \
-         sensorless drive several degrees, so it has to be calibrated.",
-        100.0 * mismatch
-    ));
+    texts::add_remarks(&mut outcome, "adc-calibration", &[("mismatch", 100.0 * mismatch)]);
     Ok(outcome)
 }

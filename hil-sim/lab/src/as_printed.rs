@@ -71,14 +71,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let value = weak.error.get(k).copied().unwrap_or(f64::NAN);
         outcome.metrics.set(format!("weak_saliency_error_at_{level}_a_deg"), value);
     }
-    let rises = weak.error.windows(2).all(|pair| pair[1] > pair[0]);
-    outcome.remarks.push(format!(
-        "With a tenth of the saliency assumed elsewhere the error {} with the q-axis current, from {:.0}° at 1 A to {:.0}° at \
-         2 A; the source states about 50° at every level. No saliency gives the constant 50°, which remains unexplained.",
-        if rises { "rises" } else { "does not rise" },
-        weak.error.first().copied().unwrap_or(f64::NAN),
-        weak.error.last().copied().unwrap_or(f64::NAN),
-    ));
+    texts::add_remarks(&mut outcome, "as-printed", &[]);
     position::add(context, &mut outcome)?;
     order::add(&mut outcome)?;
     sources::add(context, &mut outcome)?;

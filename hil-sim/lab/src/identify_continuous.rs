@@ -25,7 +25,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         slow.filter(|e| ["B", "C"].contains(&e.model) && ["r_s", "tau_r"].contains(&e.parameter))
     {
         let key = format!("{}_{}_{}", e.case.signal.name(), e.model, e.parameter).to_lowercase();
-        outcome.metrics.set(format!("slow_{key}_pct"), e.ours_pct);
+        outcome.metrics.set(format!("slow_{key}_pct"), e.mean_pct);
     }
     Ok(outcome)
 }

@@ -38,11 +38,11 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     ] {
         outcome.compared.push(beside(place, quantity).simulated(value));
     }
+    outcome.metrics.set("r_r_of_printed_readings_ohm", Readings::printed().exact().rr);
     let bias = readings.as_printed().rr / plant.machine.rr;
     let low = 1.0 - free.as_printed().lm / readings.as_printed().lm;
     let values = [
         ("bias", bias),
-        ("r_r", Readings::PRINTED.exact().rr),
         ("friction", plant.mechanics.friction),
         ("free_a", free.no_load.2),
         ("driven_a", readings.no_load.2),

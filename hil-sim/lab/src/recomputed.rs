@@ -4,7 +4,6 @@ use drive_core::carrier::CARRIER_SAMPLES;
 use drive_settings::tuning::rule_3_8;
 use sim_bench::plant::InverterSettings;
 
-use crate::identification::bench_tests::Readings;
 use crate::prelude::*;
 
 /// Control period, s.
@@ -28,7 +27,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let within = |hz: &f64| 100.0 * (fictitious(*hz) / hz - 1.0) <= bound;
     let limit = (1..30_000).map(|n| 0.1 * f64::from(n)).take_while(within).last();
     let limit = limit.unwrap_or(f64::NAN);
-    outcome.compared.push(named("difference_small_up_to").recomputed(limit));
+    outcome.compared.push(named("difference_small_up_to").of_print(limit));
     outcome.figures.push(figure_13());
     position_loop(&mut outcome);
     Ok(outcome)
@@ -38,7 +37,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
 fn constants(outcome: &mut Outcome) {
     let (drive, config, motor) =
         (Settings::default(), Config::default(), MachineSettings::default());
-    let (plate, tests) = (config.drive.nameplate, Readings::PRINTED);
+    let plate = config.drive.nameplate;
     // The value is the same in the plant, on the bench and in the drive.
     let both = |plant: f64, drive: f32| if plant as f32 == drive { plant } else { f64::NAN };
     let three = |plant: f64, bench: f64, drive: f32| both(both(plant, bench as f32), drive);
@@ -62,14 +61,6 @@ fn constants(outcome: &mut Outcome) {
         ("section 3.10", "reference of the direct current in all tests", 1e3 * f64::from(config.drive.i_d())),
         ("Figure 28", "delay from the command to the first switch", InverterSettings::default().propagation_us),
         ("Figure 28", "further delay to the second switch", 1e6 * f64::from(drive.inverter.dead_time_s)),
-        ("section 3.6.1", "voltage", tests.dc.0),
-        ("section 3.6.1", "current", tests.dc.1),
-        ("section 3.6.2", "frequency", tests.locked.0),
-        ("section 3.6.2", "phase voltage", tests.locked.1),
-        ("section 3.6.2", "phase current", tests.locked.2),
-        ("section 3.6.2", "theta_rb", tests.locked.3),
-        ("section 3.6.3", "phase voltage", tests.no_load.1),
-        ("section 3.6.3", "phase current", 1e3 * tests.no_load.2),
         ("section 3.6.1", "r_s", three(motor.rs, bench.r_s, drive.motor.r_s)),
         ("section 3.6.2", "r_r", three(motor.rr, bench.r_r, drive.motor.r_r)),
         ("section 3.6.2", "L_l1 = L_l2", 1e3 * leakage),

@@ -44,6 +44,8 @@ pub struct Printed {
     pub chapter: String,
     /// Short name of the chapter.
     id: String,
+    /// Conditions of our values in this chapter; may be empty.
+    ours: String,
     /// Name in the program, if an experiment uses it; otherwise empty.
     name: String,
     /// The printed place: `Eq. 3.20`, `Table 6, 1.5 A`.
@@ -79,6 +81,9 @@ struct Chapter {
     /// Short name on the page.
     id: String,
     name: String,
+    /// Conditions of our values, for the head of the table.
+    #[serde(default)]
+    ours: String,
     /// Place, quantity, unit, value, kind and name; formula, slip.
     #[serde(default)]
     printed: Vec<Vec<String>>,
@@ -105,12 +110,23 @@ fn files() -> impl Iterator<Item = File> {
 pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
     let mut all = Vec::new();
     for File { source, chapter, .. } in files() {
-        for Chapter { id, name, printed, table } in chapter {
+        for Chapter { id, name, ours, printed, table } in chapter {
             let chapter = name;
             let mut add = |texts: [&str; 4], rest: Printed| {
                 let [place, quantity, unit, value] = texts.map(str::to_owned);
-                let (source, chapter, id) = (source.clone(), chapter.clone(), id.clone());
-                all.push(Printed { source, chapter, id, place, quantity, unit, value, ..rest });
+                let [source, chapter, id, ours] =
+                    [&source, &chapter, &id, &ours].map(String::clone);
+                all.push(Printed {
+                    source,
+                    chapter,
+                    id,
+                    ours,
+                    place,
+                    quantity,
+                    unit,
+                    value,
+                    ..rest
+                });
             };
             for row in &printed {
                 let [place, quantity, unit, value, kind, more @ ..] = &row[..] else {
@@ -219,6 +235,11 @@ impl Printed {
         }
     }
 
+    /// Returns the head of the table of its chapter, with the conditions of our values.
+    fn head(&self) -> String {
+        format!("Printed values and ours{}", self.ours)
+    }
+
     fn take(&self) -> Option<f64> {
         self.taken.store(true, Ordering::Relaxed);
         self.number()
@@ -250,110 +271,96 @@ impl Printed {
     }
 }
 
-/// Comparison of a printed value with ours.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Verdict {
+/// Class of a comparison of a printed value with ours, from the best to the worst.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
     /// Equal to the last printed digit.
     Equal,
-    /// Equal except for this.
-    EqualBut(String),
-    /// Different; this row of [`ERRATA`] explains it.
-    Differs(usize),
-    /// Different; the source does not state this quantity.
-    Unknown(&'static str),
-    /// A mean of random runs: our value divided by the printed one, and its range over seeds.
-    Statistics {
-        /// Our value divided by the printed one.
-        factor: f64,
-        /// Smallest and largest value over seeds.
-        seeds: [f64; 2],
-    },
+    /// Equal except for what the text says.
+    EqualBut,
+    /// An input of a formula or of a run, with nothing beside it.
+    Input,
+    /// Different; an erratum explains it.
+    Differs,
+    /// Different, but the source does not state a quantity on which the value depends.
+    Unknown,
+    /// A mean of random runs that lies within the spread of ours over seeds.
+    WithinSpread,
     /// Nothing is compared, or the difference is not explained.
     None,
 }
+
+impl Class {
+    /// Heads of the counts on the first page.
+    pub const NAMES: [&str; 7] = [
+        "equal",
+        "equal but for unit or last digits",
+        "input",
+        "differs, follows from",
+        "differs, cannot be known",
+        "within the spread over seeds",
+        "none",
+    ];
+
+    fn named(self) -> Verdict {
+        (self, Self::NAMES[self as usize].to_owned())
+    }
+}
+
+/// Class of a comparison, and the comparison in words.
+pub type Verdict = (Class, String);
 
 /// Relative precision of constants and filter sections in `f32`.
 const SINGLE: f64 = 1e-5;
 /// Relative difference within which a value that was read off a graph counts as equal.
 const GRAPH: f64 = 0.02;
 
-/// Returns the verdict on a printed value. An input or a reading that is taken from the list needs no value beside it.
+/// Returns the verdict on a printed value: the worse one if it was both recomputed and simulated. An input or a reading that is
+/// taken from the list needs no value beside it.
 pub fn verdict(place: usize, ours: &Compared) -> Verdict {
     let printed = &PRINTED[place];
-    let taken =
-        matches!(printed.kind, Kind::Input | Kind::Graph) && printed.taken.load(Ordering::Relaxed);
-    let value = match printed.kind {
-        Kind::Input => ours.used.or(ours.value()),
-        _ => ours.value(),
-    };
-    let Some(value) = value.filter(|_| ours.used.is_none_or(|used| printed.is_used(used))) else {
-        return match (ours.unknown, ours.used) {
-            (Some(what), None) => Verdict::Unknown(what),
-            (None, None) if taken => Verdict::Equal,
-            _ => Verdict::None,
-        };
-    };
-    let ratio = printed.number().map_or(f64::NAN, |printed| value / printed);
-    let off = (ratio - 1.0).abs();
-    // Our value is rounded as well.
-    if printed.agrees(value, 0.501) {
-        return printed.slip.clone().map_or(Verdict::Equal, Verdict::EqualBut);
-    }
-    if let Some((what, _)) = ours.but.filter(|(_, share)| off < *share) {
-        return Verdict::EqualBut(what.to_owned());
-    }
-    if let Some([low, high]) = ours.seeds {
-        let printed = value / ratio;
-        return Verdict::Statistics { factor: ratio, seeds: [low / printed, high / printed] };
-    }
-    if let Some(row) = ERRATA.iter().position(|row| row.explains(place)) {
-        return Verdict::Differs(row);
-    }
-    match ours.unknown {
-        Some(what) => Verdict::Unknown(what),
-        None if printed.kind == Kind::Graph && off <= GRAPH => {
-            Verdict::EqualBut(format!("read off a graph, {:.1} %", 100.0 * off))
-        }
-        None if printed.kind != Kind::Claim && printed.agrees(value, 1.0) => {
-            Verdict::EqualBut("rounding".to_owned())
-        }
-        None => Verdict::None,
+    let is_input = matches!(printed.kind, Kind::Input | Kind::Graph);
+    let judged = [ours.recomputed, ours.simulated].into_iter().flatten();
+    let worst = judged.map(|value| judge(place, ours, value)).max();
+    match (worst, ours.used, ours.unknown) {
+        (_, Some(used), _) if !printed.is_used(used) => Class::None.named(),
+        (Some(worst), ..) => worst,
+        (None, Some(_), _) => Class::Equal.named(),
+        (None, None, Some(what)) => unknown(what),
+        _ if is_input && printed.taken.load(Ordering::Relaxed) => Class::Input.named(),
+        _ => Class::None.named(),
     }
 }
 
-impl Verdict {
-    /// Heads of the counts on the first page.
-    pub const NAMES: [&str; 6] = [
-        "equal",
-        "equal but for unit or rounding",
-        "differs, follows from",
-        "differs, cannot be known",
-        "statistics",
-        "none",
-    ];
+fn unknown(what: &str) -> Verdict {
+    (Class::Unknown, format!("cannot be known: the source does not state {what}"))
+}
 
-    /// Returns the index in [`Self::NAMES`].
-    pub fn number(&self) -> usize {
-        match self {
-            Self::Equal => 0,
-            Self::EqualBut(_) => 1,
-            Self::Differs(_) => 2,
-            Self::Unknown(_) => 3,
-            Self::Statistics { .. } => 4,
-            Self::None => 5,
-        }
+/// Returns the verdict on a printed value by one value of ours.
+fn judge(place: usize, ours: &Compared, value: f64) -> Verdict {
+    let printed = &PRINTED[place];
+    let number = printed.number().unwrap_or(f64::NAN);
+    let off = (value / number - 1.0).abs();
+    let equal_but = |what: &str| (Class::EqualBut, format!("equal but for: {what}"));
+    // Our value is rounded as well.
+    if printed.agrees(value, 0.501) {
+        return printed.slip.as_deref().map_or(Class::Equal.named(), equal_but);
     }
-
-    /// Describes the verdict in words.
-    pub fn text(&self) -> String {
-        match self {
-            Self::Equal | Self::None => Self::NAMES[self.number()].to_owned(),
-            Self::EqualBut(what) => format!("equal but for: {what}"),
-            Self::Differs(row) => format!("differs, erratum {}", row + 1),
-            Self::Unknown(what) => format!("cannot be known: the source does not state {what}"),
-            Self::Statistics { factor, seeds: [low, high] } => {
-                format!("statistics: {factor:.2} of printed, {low:.2} to {high:.2} over seeds")
-            }
+    if let Some((what, _)) = ours.but.filter(|(_, share)| off < *share) {
+        return equal_but(what);
+    }
+    if let Some([low, high]) = ours.seeds.filter(|[low, high]| (*low..=*high).contains(&number)) {
+        let spread = format!("{:.2} to {:.2} of printed", low / number, high / number);
+        return (Class::WithinSpread, format!("within the spread over seeds: {spread}"));
+    }
+    if let Some(row) = ERRATA.iter().position(|row| row.explains(place)) {
+        return (Class::Differs, format!("differs, erratum {}", row + 1));
+    }
+    match ours.unknown {
+        Some(what) => unknown(what),
+        None if printed.kind == Kind::Graph && off <= GRAPH => {
+            equal_but(&format!("read off a graph, {:.1} %", 100.0 * off))
         }
+        None => Class::None.named(),
     }
 }

@@ -18,10 +18,10 @@ const IQ_A: f64 = 1.5;
 pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     let mut table = texts::table("as-printed", "sources");
     for column in COLUMNS {
-        // This holds by construction.
+        // By definition of the columns.
         let without = f64::from(column != COLUMNS[0]);
         let place = beside("Table 1, works without encoder", column);
-        outcome.compared.push(place.simulated(without));
+        outcome.compared.push(place.of_print(without));
         for (row, rpm) in SPEEDS {
             let found = tracked(context, column, rpm)?;
             // The method works if the angle it gives is right: by injection while it is on, otherwise by the model.

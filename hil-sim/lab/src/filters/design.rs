@@ -31,7 +31,7 @@ pub enum Band {
 }
 
 /// Ripple factor of an attenuation in dB.
-fn ripple(db: f64) -> f64 {
+pub fn ripple(db: f64) -> f64 {
     (10f64.powf(0.1 * db) - 1.0).sqrt()
 }
 

@@ -20,9 +20,19 @@ pub struct Readings {
 }
 
 impl Readings {
-    /// The readings of sections 3.6.1 to 3.6.3.
-    pub const PRINTED: Self =
-        Self { dc: (27.9, 2.60), locked: (15.0, 22.67, 2.71, 0.671), no_load: (60.0, 37.9, 0.491) };
+    /// Returns the readings of sections 3.6.1 to 3.6.3; the frequency without load is the rated one.
+    pub fn printed() -> Self {
+        let of = |section: &str, quantity: &str| {
+            source::printed(&format!("section 3.6.{section}"), quantity)
+        };
+        let locked =
+            ["frequency", "phase voltage", "phase current", "theta_rb"].map(|q| of("2", q));
+        Self {
+            dc: (of("1", "voltage"), of("1", "current")),
+            locked: locked.into(),
+            no_load: (60.0, of("3", "phase voltage"), of("3", "phase current") / 1e3),
+        }
+    }
 
     /// Impedance of a phase with the rotor locked (Eq. 3.17), ohm.
     pub fn locked_impedance(&self) -> Complex {
@@ -85,7 +95,7 @@ pub enum Shaft {
 }
 
 /// Runs the three tests on a simulated motor, with the currents and the no-load voltage of
-/// [`Readings::PRINTED`].
+/// [`Readings::printed`].
 ///
 /// # Errors
 /// [`PlantError`] if the plant refuses the settings.
@@ -99,7 +109,7 @@ pub fn measure(
         let mechanics = Mechanics::new(&MechanicsSettings { load, ..*mechanics })?;
         Ok(MotorModel::new(Machine::new(machine, saliency)?, mechanics))
     };
-    let printed = Readings::PRINTED;
+    let printed = Readings::printed();
 
     let locked = bench(Load::Locked)?;
     let dc = adjusted(printed.dc, |volts| dc_current(locked, volts));

@@ -56,7 +56,7 @@ pub fn add(compared: &mut Vec<Compared>, metrics: &mut Metrics) {
         ("continuous_slow", c_most < 6.0),
         ("r_s_slow", r_s <= 20.0),
     ] {
-        compared.push(named(name).recomputed(holds));
+        compared.push(named(name).of_print(holds));
     }
 
     // f_1b and the speed are proportional (Eq. 42).

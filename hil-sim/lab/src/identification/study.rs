@@ -87,6 +87,8 @@ pub struct Entry {
     pub printed_pct: Option<f64>,
     /// Our error, %.
     pub ours_pct: f64,
+    /// Mean of our error over seeds, %.
+    pub mean_pct: f64,
 }
 
 impl Entry {
@@ -119,7 +121,7 @@ impl Errors {
             };
             let entry = |(&parameter, &ours_pct): (&&'static str, &f64)| {
                 let printed_pct = printed::error(model, case, parameter);
-                Entry { model, case, parameter, printed_pct, ours_pct }
+                Entry { model, case, parameter, printed_pct, ours_pct, mean_pct: ours_pct }
             };
             names.iter().zip(errors).map(entry).collect()
         };
@@ -147,7 +149,10 @@ pub fn tables(
         Ok(all(Noise::HALF, context.seed + n))
     })?;
     let mut outcome = Outcome::default();
-    let entries = seeds[0].clone();
+    let mut entries = seeds[0].clone();
+    for (k, entry) in entries.iter_mut().enumerate() {
+        entry.mean_pct = Stats::of(seeds.iter().map(|seed| seed[k].ours_pct)).mean();
+    }
     for (k, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.printed_pct.is_some()) {
         let over = sorted(seeds.iter().map(|seed| seed[k].ours_pct));
         let ends = [over[0], over[over.len() - 1]];

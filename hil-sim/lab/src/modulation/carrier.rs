@@ -31,7 +31,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
     outcome.metrics.set("sideband_over_signal", sideband);
     let lower = at(&p, CARRIER_HZ - middle) / at(&a, middle);
     let holds = (sideband - 0.5).abs() < 0.01 && (lower - 0.5).abs() < 0.01;
-    outcome.compared.push(named("side_bands").recomputed(holds));
+    outcome.compared.push(named("side_bands").of_print(holds));
     for (key, offset) in [("inner", *BAND.start()), ("outer", *BAND.end())] {
         let offset = f64::from(offset);
         for (side, hz) in [("lower", CARRIER_HZ - offset), ("upper", CARRIER_HZ + offset)] {

@@ -24,6 +24,10 @@ pub struct Erratum {
     /// The printed values that differ because of this erratum: place, and quantity.
     #[serde(default)]
     pub(super) of: Vec<[String; 2]>,
+    /// Beginnings of the places of printed means over random runs that differ because of this erratum, unless they lie within the
+    /// spread over seeds.
+    #[serde(default)]
+    pub(super) means: Vec<String>,
     /// Basis of the finding: our value of `PLACE | QUANTITY`, `EXPERIMENT/METRIC`, or a formula of this source; and the
     /// number with the digits that are shown.
     #[serde(default)]
@@ -52,7 +56,10 @@ impl Erratum {
     /// Whether this printed value differs because of this erratum. A quantity `*` stands for all quantities of a place;
     /// a place that ends in `*` stands for all places that begin so.
     pub fn explains(&self, place: usize) -> bool {
-        self.of.iter().any(|of| self.names(of, &PRINTED[place]))
+        let printed = &PRINTED[place];
+        let is_mean = |begin: &String| printed.place.starts_with(begin);
+        self.of.iter().any(|of| self.names(of, printed))
+            || self.source == printed.source && self.means.iter().any(is_mean)
     }
 
     /// Whether a row of `of` names this printed value.

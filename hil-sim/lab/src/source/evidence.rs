@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use sim_bench::outcome::{Cell, Compared, Figure, Outcome, Table};
+use sim_bench::outcome::{Against, Cell, Compared, Figure, Outcome, Table};
 
 use super::errata::{ERRATA, Erratum, OWN, rounded};
-use super::{Kind, PRINTED, Printed, Verdict, place_of, value_of, verdict};
+use super::{Class, Kind, PRINTED, Printed, Verdict, place_of, value_of, verdict};
 use crate::texts;
 
 /// Results of the experiments.
@@ -26,7 +26,7 @@ impl Default for Evidence {
         let of = |(place, printed): (usize, &'static Printed)| {
             let value = printed.recomputed()?;
             let ours = Compared::with(&printed.source, &*printed.place, &*printed.quantity);
-            Some((place, (Vec::new(), ours.recomputed(value))))
+            Some((place, (Vec::new(), ours.of_print(value))))
         };
         let compared = PRINTED.iter().enumerate().filter_map(of).collect();
         Self { compared, metrics: HashMap::new(), astray: Vec::new(), figures: Vec::new() }
@@ -50,6 +50,7 @@ impl Evidence {
             known.1.recomputed = known.1.recomputed.or(ours.recomputed);
             known.1.simulated = known.1.simulated.or(ours.simulated);
             known.1.used = known.1.used.or(ours.used);
+            known.1.against = known.1.against.max(ours.against);
         }
         let shown = |figure: &&Figure| figure.source.contains("Figure");
         let figures = outcome.figures.iter().filter(shown).cloned();
@@ -71,18 +72,22 @@ impl Evidence {
         self.metrics.get(name).copied()
     }
 
+    fn against(&self, place: usize) -> Against {
+        self.compared.get(&place).map_or(Against::Nothing, |(_, ours)| ours.against)
+    }
+
     /// Returns the verdict on a place.
     pub fn verdict(&self, place: usize) -> Verdict {
         let none = Compared::default();
         verdict(place, self.compared.get(&place).map_or(&none, |(_, ours)| ours))
     }
 
-    /// Counts the printed values of a source (and kind) by verdict, in the order of [`Verdict::NAMES`].
-    pub fn count(&self, source: &str, kind: Option<Kind>) -> [usize; 6] {
-        let mut counts = [0; 6];
+    /// Counts the printed values of a source, with ours of this origin (or any), by verdict in the order of [`Class::NAMES`].
+    pub fn count(&self, source: &str, against: Option<Against>) -> [usize; 7] {
+        let mut counts = [0; 7];
         for (place, printed) in PRINTED.iter().enumerate() {
-            if printed.source == source && kind.is_none_or(|kind| kind == printed.kind) {
-                counts[self.verdict(place).number()] += 1;
+            if printed.source == source && against.is_none_or(|one| one == self.against(place)) {
+                counts[self.verdict(place).0 as usize] += 1;
             }
         }
         counts
@@ -95,7 +100,8 @@ impl Evidence {
         places.sort_unstable();
         places.dedup();
         let rows = places.iter().map(|&place| self.row(place, &PRINTED[place]));
-        Table::new("Printed values and ours", &[]).records(rows)
+        let head = places.first().map_or(String::new(), |&place| PRINTED[place].head());
+        Table::new(head, &[]).records(rows)
     }
 
     /// Returns the experiments and tests that give the numbers of an erratum, each once; [`OWN`] for values that follow
@@ -122,8 +128,15 @@ impl Evidence {
             faults.push(format!("{}: a number is missing", erratum.place));
         }
         for of in &erratum.of {
-            if !PRINTED.iter().any(|printed| erratum.names(of, printed)) {
-                faults.push(format!("{}: the list has no {}", erratum.place, of.join(", ")));
+            let mut named =
+                (0..PRINTED.len()).filter(|&k| erratum.names(of, &PRINTED[k])).peekable();
+            let differs = |k| self.verdict(k).0 == Class::Differs;
+            if named.peek().is_none() || !named.all(differs) {
+                let of = of.join(", ");
+                faults.push(format!(
+                    "{}: {of} is not in the list, or does not differ",
+                    erratum.place
+                ));
             }
         }
         for [name, shown] in &erratum.numbers {
@@ -147,7 +160,7 @@ impl Evidence {
         let none = |(number, printed): (usize, &Printed)| {
             let Printed { source, place, quantity, value, .. } = printed;
             let ours = self.value(number).map_or("nothing".to_owned(), |ours| ours.to_string());
-            (self.verdict(number) == Verdict::None)
+            (self.verdict(number).0 == Class::None)
                 .then(|| format!("{source} {place}, {quantity}: {value} printed, ours {ours}"))
         };
         let mut faults: Vec<_> = PRINTED.iter().enumerate().filter_map(none).collect();
@@ -160,21 +173,17 @@ impl Evidence {
     pub fn counts(&self) -> Table {
         let mut table = Table::new("Printed values by verdict", &[]);
         for source in ["S1", "S0"] {
-            for (what, kind) in [
-                ("all", None),
-                ("inputs", Some(Kind::Input)),
-                ("results", Some(Kind::Result)),
-                ("read off graphs", Some(Kind::Graph)),
-                ("claims", Some(Kind::Claim)),
-            ] {
-                let counts = self.count(source, kind);
+            use Against::{Nothing, Print, Program, Simulation};
+            for against in [None, Some(Simulation), Some(Program), Some(Print), Some(Nothing)] {
+                let (what, counts) =
+                    (against.map_or("all", Against::name), self.count(source, against));
                 let whole = |count: usize| Cell::fixed(count as f64, 0);
                 let mut row = vec![
                     ("source", Cell::from(source)),
-                    ("values", what.into()),
+                    ("against", what.into()),
                     ("printed", whole(counts.iter().sum())),
                 ];
-                row.extend(Verdict::NAMES.into_iter().zip(counts.map(whole)));
+                row.extend(Class::NAMES.into_iter().zip(counts.map(whole)));
                 table.record(row);
             }
         }
@@ -227,9 +236,12 @@ impl Evidence {
     /// Makes the first page: counts, errata, and an explanation of the numbers.
     fn first(&self) -> Chapter {
         let mut outcome = Outcome::default();
-        let equal = |source| self.count(source, None)[..2].iter().sum::<usize>() as f64;
-        outcome.metrics.set("equal_of_barroso_2017", equal("S1"));
-        outcome.metrics.set("equal_of_jacobina_1996", equal("S0"));
+        let equal = |source| {
+            let of = |against| self.count(source, Some(against))[..2].iter().sum::<usize>();
+            (of(Against::Program) + of(Against::Simulation)) as f64
+        };
+        outcome.metrics.set("equal_to_program_or_simulation_of_barroso_2017", equal("S1"));
+        outcome.metrics.set("equal_to_program_or_simulation_of_jacobina_1996", equal("S0"));
         outcome.tables.push(self.counts());
         let errata = ERRATA.iter().zip(1..).map(|(erratum, number)| {
             [
@@ -266,7 +278,7 @@ impl Evidence {
         }
     }
 
-    fn row(&self, place: usize, printed: &Printed) -> [(&'static str, Cell); 9] {
+    fn row(&self, place: usize, printed: &Printed) -> [(&'static str, Cell); 10] {
         let ours = self.compared.get(&place).map(|(_, ours)| ours);
         let shown = |value: Option<f64>| {
             Cell::or_dash(value.map(|value| match (printed.kind, value) {
@@ -275,10 +287,12 @@ impl Evidence {
                 _ => Cell::significant(value, 6),
             }))
         };
-        let difference =
-            |value: f64| printed.number().map(|printed| 100.0 * (value / printed - 1.0));
+        let number = printed.number().unwrap_or(f64::NAN);
         let is_number = printed.kind != Kind::Claim;
-        let difference = ours.and_then(Compared::value).and_then(difference);
+        // The larger one, like the verdict.
+        let both = ours.into_iter().flat_map(|o| [o.recomputed, o.simulated]).flatten();
+        let differences = both.map(|value| 100.0 * (value / number - 1.0));
+        let difference = differences.max_by(|a, b| a.abs().total_cmp(&b.abs()));
         let difference = difference.filter(|d| is_number && d.is_finite());
         let text = || printed.value.clone();
         let value = printed.number().filter(|_| is_number);
@@ -292,8 +306,9 @@ impl Evidence {
             ("recomputed", shown(ours.and_then(|ours| ours.recomputed))),
             ("by", printed.formula.as_deref().map_or("-".into(), Cell::from)),
             ("simulated", shown(ours.and_then(|ours| ours.simulated))),
+            ("against", self.against(place).name().into()),
             ("difference (%)", Cell::fixed_or_dash(difference, 2)),
-            ("verdict", self.verdict(place).text().into()),
+            ("verdict", self.verdict(place).1.into()),
         ]
     }
 }
@@ -315,7 +330,7 @@ pub struct Chapter {
 impl Chapter {
     fn of(printed: &'static Printed) -> Self {
         let mut outcome = Outcome::default();
-        outcome.tables.push(Table::default());
+        outcome.tables.push(Table::new(&printed.head(), &[]));
         let name = format!("{}-{}", printed.source, printed.id);
         let about = printed.chapter.clone();
         Self { name, source: &printed.source, about, runs: Vec::new(), outcome }

@@ -1,11 +1,11 @@
 //! Evaluates the formulas of the printed lists: numbers, names, `{names of any text}`, functions of one argument,
-//! parentheses, a sign, and `+ - * / ^`.
+//! parentheses, a sign, `+ - * / ^`, and the comparisons `< >`, which are 1 or 0.
 //!
 //! The crates that evaluate formulas bring parsers of regular expressions with them. To compile those for these few
 //! formulas took 30 s of a processor.
 
 /// The operators. Each one has precedence over those before it, so `a*b/c` is `a*(b/c)`.
-const OPERATORS: &str = "+-*/^";
+const OPERATORS: &str = "<>+-*/^";
 
 /// Returns the value of a formula; `value` gives the values of its names.
 pub fn evaluate(formula: &str, value: &dyn Fn(&str) -> Option<f64>) -> Option<f64> {
@@ -36,6 +36,8 @@ impl<'a> Formula<'a> {
             let operator = self.take(1);
             let right = self.operation(rank + 1)?;
             left = match operator {
+                "<" => f64::from(left < right),
+                ">" => f64::from(left > right),
                 "+" => left + right,
                 "-" => left - right,
                 "*" => left * right,
@@ -77,7 +79,6 @@ impl<'a> Formula<'a> {
                             "floor" => x.floor(),
                             "ln" => x.ln(),
                             "round" => x.round(),
-                            "signum" => x.signum(),
                             "sin" => x.sin(),
                             "sqrt" => x.sqrt(),
                             "tan" => x.tan(),
