@@ -1,6 +1,7 @@
-//! The drive of Barroso 2017 as printed: without a sensor (Figures 38 and 39), the position controller on the plant for
+//! The drive of Barroso 2017 as printed: without a sensor (Figures 38 and 39), its angle reference (Eq. 2.10), the position controller on the plant for
 //! which it was designed (Figure 37), filter and rotation in either order (section 3.4), and Table 1 as runs.
 
+mod beside;
 mod order;
 mod position;
 mod sources;
@@ -48,13 +49,13 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let degrees = printed(figure, &format!("angle error, {which}"));
         vec![(0.0, degrees), (LEVELS_A.len() as f64, degrees)]
     };
-    panel = panel
+    outcome.tables.push(table);
+    panel = beside::add(context, &mut outcome, panel)?
         .with(Series::limit("printed, about 50°", band("Figure 38", "about")))
         .with(Series::reference("40° and 60° of Figure 39", band("Figure 39", "least")))
         .with(Series::reference("", band("Figure 39", "largest")));
     let figure = texts::figure("as-printed", "levels");
     outcome.figures.push(figure.panel(panel));
-    outcome.tables.push(table);
     // The motor whose errors are closest to the printed ones: a tenth of the assumed saliency.
     let weak = &found[1];
     let errors = Stats::of(weak.error.iter().copied());
@@ -70,6 +71,9 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     for (k, level) in LEVELS_A.iter().enumerate() {
         let value = weak.error.get(k).copied().unwrap_or(f64::NAN);
         outcome.metrics.set(format!("weak_saliency_error_at_{level}_a_deg"), value);
+    }
+    if let [first, .., last] = weak.torque[..] {
+        outcome.metrics.set("weak_saliency_torque_ratio", last / first);
     }
     texts::add_remarks(&mut outcome, "as-printed", &[]);
     position::add(context, &mut outcome)?;
