@@ -38,8 +38,8 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         outcome.metrics.set(format!("largest_residual_{key}_a"), 1e-3 * largest);
         outcome.metrics.set(format!("full_scale_{key}_a"), fitted.at(LAST_CODE));
     }
-    let mismatch = outcome.metrics.get("slope_b_a").zip(outcome.metrics.get("slope_a_a"));
-    let mismatch = mismatch.map_or(f64::NAN, |(b, a)| b / a - 1.0);
+    let slope = |name: &str| outcome.metrics.get(name).unwrap_or(f64::NAN);
+    let mismatch = slope("slope_b_a") / slope("slope_a_a") - 1.0;
     outcome.metrics.set("gain_mismatch", mismatch);
     let figure = texts::figure("adc-calibration", "calibration");
     outcome.figures.push(figure.panel(readings).panel(residuals));

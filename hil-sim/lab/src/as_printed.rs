@@ -54,8 +54,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         .with(Series::limit("printed, about 50°", band("Figure 38", "about")))
         .with(Series::reference("40° and 60° of Figure 39", band("Figure 39", "least")))
         .with(Series::reference("", band("Figure 39", "largest")));
-    let figure = texts::figure("as-printed", "levels");
-    outcome.figures.push(figure.panel(panel));
+    outcome.figures.push(texts::figure("as-printed", "levels").panel(panel));
     // The motor whose errors are closest to the printed ones: a tenth of the assumed saliency.
     let weak = &found[1];
     let errors = Stats::of(weak.error.iter().copied());
@@ -72,9 +71,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let value = weak.error.get(k).copied().unwrap_or(f64::NAN);
         outcome.metrics.set(format!("weak_saliency_error_at_{level}_a_deg"), value);
     }
-    if let [first, .., last] = weak.torque[..] {
-        outcome.metrics.set("weak_saliency_torque_ratio", last / first);
-    }
+    let ratio = weak.torque.last().zip(weak.torque.first()).map_or(f64::NAN, |(l, f)| l / f);
+    outcome.metrics.set("weak_saliency_torque_ratio", ratio);
     texts::add_remarks(&mut outcome, "as-printed", &[]);
     position::add(context, &mut outcome)?;
     order::add(&mut outcome)?;

@@ -25,7 +25,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let filters = filters();
     let mut outcome = Outcome::default();
     outcome.figures.push(bode(&filters));
-    outcome.figures.push(stop_band(&filters[0]));
     characteristics(&filters, &mut outcome);
     recomputed(&filters, &mut outcome);
     let errors = precision::errors(&filters, samples, context, &mut outcome)?;
@@ -58,19 +57,6 @@ fn bode(filters: &[ComparedFilter]) -> Figure {
     };
     let (gain, phase) = (dashed(gain, printed), dashed(phase, lag));
     texts::figure("filters", "bode").panel(gain.y_range(-100.0, 5.0)).panel(phase)
-}
-
-fn stop_band(lpf: &ComparedFilter) -> Figure {
-    let along = |response: &dyn Fn(f64) -> Complex64| {
-        let hz = (0..=900).map(|k| 440.0 + f64::from(k) * 0.25);
-        hz.map(|hz| (hz, decibels(response(omega_t(hz))))).collect()
-    };
-    let panel = Panel::new("frequency (Hz)", "gain (dB)")
-        .y_range(-80.0, 5.0)
-        .with(Series::line("sections, f32", along(&|w| lpf.sections(w))))
-        .with(Series::line("direct form, f32 coefficients", along(&|w| lpf.direct_rounded(w))))
-        .with(Series::reference("Table 7, f64", along(&|w| lpf.direct(w))));
-    texts::figure("filters", "stop-band").panel(panel)
 }
 
 fn characteristics(filters: &[ComparedFilter], outcome: &mut Outcome) {
@@ -117,7 +103,7 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
         }
         let key = filter.name.to_lowercase();
         outcome.metrics.set(format!("{key}_design_differs_by"), largest);
-        let order = filter.printed[1].len() - 1;
+        let order = drive[1].len() - 1;
         let place = beside("section 3.10", &format!("order of {}", filter.name));
         outcome.compared.push(place.recomputed(order as f64));
     }

@@ -8,7 +8,7 @@ use crate::prelude::*;
 ///
 /// # Errors
 /// If the configuration or the drive is refused.
-pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let ratios = ratios::all();
     let largest = |of: fn(&Ratio) -> f64| {
@@ -28,18 +28,6 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         ]
     }));
     outcome.tables.push(table);
-    let machines = [("PX", Parameters::PX), ("rbv", Parameters::RBV)].map(|(name, machine)| {
-        let Parameters { r_s, tau_r, sigma_l_s, l_s, .. } = machine;
-        [
-            ("machine", Cell::from(name)),
-            ("r_s (Ω)", Cell::fixed(r_s, 3)),
-            ("τ_r (s)", Cell::fixed(tau_r, 5)),
-            ("σ l_s (H)", Cell::fixed(sigma_l_s, 6)),
-            ("l_s (H)", Cell::fixed(l_s, 4)),
-            ("r_s/(σ l_s) (1/s)", Cell::fixed(r_s / sigma_l_s, 1)),
-        ]
-    });
-    outcome.tables.push(Table::new("Machines", &[]).records(machines));
     let px = Parameters::PX;
     outcome.metrics.set("px_r_s_over_sigma_l_s", px.r_s / px.sigma_l_s);
     outcome.metrics.set("px_tau_r_s", px.tau_r);
@@ -48,6 +36,6 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
             ["Sg", "rbv"].map(|row| source::number("S0", &format!("{table}, {row}"), "tau_r"));
         outcome.metrics.set(format!("{name}_below_rbv_pct"), 100.0 * (1.0 - ours / rbv));
     }
-    claims::add(&mut outcome.compared, &mut outcome.metrics);
+    claims::add(context.seed, &mut outcome.compared, &mut outcome.metrics);
     Ok(outcome)
 }

@@ -52,15 +52,9 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let error =
         |key: &str| outcome.metrics.get(&format!("current_error_{key}_pct")).unwrap_or(f64::NAN);
     let [estimated, rbv] = ["estimated", "rbv"].map(error);
-    let [six_step, both, of_rbv] = ["Sg", "Ss", "rbv"].map(|row| {
-        ["Table 6", "Table 7"].map(|table| source::number("S0", &format!("{table}, {row}"), "r_s"))
-    });
-    let apart = |a: f64, b: f64| (a / b - 1.0).abs();
     outcome.compared.extend([
         named("small_error").simulated(estimated < 5.0),
         named("much_smaller_error").simulated(estimated < 0.3 * rbv),
-        named("sg_close_to_ss").of_print(apart(six_step[0], both[0]) < 0.1),
-        named("r_s_far_from_classical").of_print(apart(six_step[1], of_rbv[1]) > 0.3),
     ]);
     // Error of tau_r on such a machine with the printed noise, which is ten times that of a real ADC.
     let [sg, ss] = Signal::ALL.map(|signal| {

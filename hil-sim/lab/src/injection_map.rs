@@ -1,5 +1,7 @@
 //! The current difference over the injection angle, Figure 19.
 
+use drive_core::filter::LPF_AS_PRINTED;
+
 use crate::prelude::*;
 
 /// Gain of the post-processing filter at dc.
@@ -20,18 +22,20 @@ pub(super) struct Variant {
     pub demodulator: DemodulatorKind,
     pub saliency: bool,
     pub inject: bool,
+    /// Whether the currents are as with LPF as printed, whose gain at dc is below 1.
+    pub lpf_as_printed: bool,
     /// Whether the delay of the demodulation is compensated.
     pub compensate: bool,
 }
 
 #[rustfmt::skip] // a variant a line
 pub(super) const LITERAL: Variant =
-    Variant { name: "literal", title: "As printed, motor with saliency", demodulator: DemodulatorKind::Literal, saliency: true, inject: true, compensate: false };
+    Variant { name: "literal", title: "As printed, motor with saliency", demodulator: DemodulatorKind::Literal, saliency: true, inject: true, lpf_as_printed: false, compensate: false };
 #[rustfmt::skip] // a variant a line
 const RECTIFIED: Variant =
     Variant { name: "rectified", title: "Rectified, delay compensated, motor with saliency", demodulator: DemodulatorKind::Rectified, compensate: true, ..LITERAL };
 #[rustfmt::skip] // a variant a line
-const VARIANTS: [Variant; 7] = [
+const VARIANTS: [Variant; 8] = [
     LITERAL,
     Variant { name: "literal_isotropic", title: "As printed, motor without saliency", saliency: false, ..LITERAL },
     Variant { name: "literal_silent", title: "As printed, no saliency and no injection", saliency: false, inject: false, ..LITERAL },
@@ -39,6 +43,7 @@ const VARIANTS: [Variant; 7] = [
     Variant { name: "rectified_isotropic", title: "Rectified, delay compensated, motor without saliency", saliency: false, ..RECTIFIED },
     Variant { name: "rectified_delayed", title: "Rectified, delay left in, motor with saliency", compensate: false, ..RECTIFIED },
     Variant { name: "rectified_isotropic_delayed", title: "Rectified, delay left in, motor without saliency", saliency: false, compensate: false, ..RECTIFIED },
+    Variant { name: "literal_lpf", title: "As printed, with the currents that LPF of Table 7 gives, no saliency", saliency: false, lpf_as_printed: true, ..LITERAL },
 ];
 
 /// delta_i in mA (with the synchronous demodulation: thousandths) over phi2 - theta in degrees.
@@ -76,25 +81,27 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("literal_injection_makes_difference_ma", same.largest());
     // On a motor without saliency, the curves of the printed chain meet at ±90° and are zero at the arc tangent.
     let id = f64::from(context.config.drive.i_d());
-    let at_90 =
-        |degrees: f64| Stats::of(isotropic[1..].iter().map(|curve| at(curve, degrees).abs()));
-    let meet = [-90.0, 90.0].map(|degrees| at_90(degrees).mean());
     let off = |(iq, curve): (&f64, _)| zero(curve).abs() - (iq / id).atan().to_degrees();
     let largest_off = Stats::of(IQ_A.iter().zip(isotropic).map(off)).largest();
     outcome.metrics.set("zero_off_the_arc_tangent_deg", largest_off);
-    let spread = |degrees| {
-        let off = |curve| at(curve, degrees).abs() / meet[0] - 1.0;
-        Stats::of(isotropic[1..].iter().map(off)).largest()
+    // Where the curves of neighbouring currents cross, within 75° of an angle.
+    let meets = |degrees: f64| {
+        let crossing = |pair: &[Curve]| {
+            let apart = |x| (x, at(&pair[0], x + degrees) - at(&pair[1], x + degrees));
+            degrees + zero(&(-5..=5).map(|k| f64::from(k * STEP_DEG)).map(apart).collect())
+        };
+        Stats::of(isotropic[1..].windows(2).map(crossing)).mean()
     };
-    let meets = |degrees: f64| if spread(degrees) < 0.05 { degrees } else { f64::NAN };
-    // LPF as printed makes the currents larger than their references by the factor by which PP reduces the signal.
-    let leak = meet[1] / PP;
+    let printed_lpf = curves[7 * IQ_A.len() + 1..].iter();
+    let leak = Stats::of(printed_lpf.map(|curve| at(curve, 90.0).abs())).mean();
     outcome.compared.extend([
         named("zero_without_iq").simulated(zero(&isotropic[0])),
         named("curves_meet_plus").simulated(meets(90.0)),
         named("curves_meet_minus").simulated(meets(-90.0)),
         named("curves_meet_about").simulated(leak),
         named("zero_at_arc_tangent").simulated(largest_off < 2.0),
+        // If the curves meet without any injection as well, no impedance explains the meeting.
+        named("impedance_explains").simulated(same.largest() > 0.05 * leak),
     ]);
     let rectified = &curves[3 * IQ_A.len()..4 * IQ_A.len()];
     let error = |curve| at(curve, 90.0) / at(&rectified[2], 90.0) - 1.0;
@@ -127,7 +134,10 @@ pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Re
     if !variant.inject {
         config.drive.injection.amplitude_v = Some(0.0);
     }
-    let mut rig = Rig::oriented(&config, seed, iq, 0.3)?;
+    // The regulated current is that behind LPF, so the real one is larger by its gain at dc.
+    let gain = if variant.lpf_as_printed { LPF_AS_PRINTED.dc_gain() } else { 1.0 };
+    config.drive.sequence.i_d = Some((f64::from(config.drive.i_d()) / gain) as f32);
+    let mut rig = Rig::oriented(&config, seed, iq / gain, 0.3)?;
     let mut curve = Curve::new();
     for x in (-180..=180).step_by(STEP_DEG as usize) {
         // theta = phi + 90° + turn, so phi2 - theta = -90° - turn

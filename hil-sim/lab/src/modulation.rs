@@ -51,8 +51,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     outcome.figures.push(vectors(&inverter));
     outcome.figures.push(sequence(&inverter));
-    let table = accuracy(&inverter, &mut outcome);
-    outcome.tables.push(table);
+    table_2(&inverter, &mut outcome);
+    accuracy(&inverter, &mut outcome);
     carrier::add(context, &mut outcome);
     Ok(outcome)
 }
@@ -80,6 +80,22 @@ fn vectors(inverter: &Inverter) -> Figure {
     texts::figure("modulation", "vectors").panel(panel)
 }
 
+/// Compares Table 2 with the voltages that the modulator makes for the corners of the hexagon, and for zero.
+fn table_2(inverter: &Inverter, outcome: &mut Outcome) {
+    let names = ["U_0", "U_60", "U_120", "U_180", "U_240", "U_300", "O_000", "O_111"];
+    for (name, k) in names.into_iter().zip(0..) {
+        let volts = if k < 6 { 2.0 / 3.0 * inverter.vdc } else { 0.0 };
+        let legs = inverter.compare(vector(volts, f64::from(k) * TAU / 6.0));
+        for (n, phases) in ["v_a v_ab", "v_b v_bc", "v_c v_ca"].into_iter().enumerate() {
+            let [a, b, c] = [0, 1, 2].map(|k| legs[(n + k) % 3] / inverter.top);
+            let values = [(2.0 * a - b - c) / 3.0, a - b];
+            let cells = phases.split(' ').zip(values);
+            let cell = |(cell, value)| beside(&format!("Table 2, {name}"), cell).used(value);
+            outcome.compared.extend(cells.map(cell));
+        }
+    }
+}
+
 /// Draws Figure 5 at 20° and half of the largest circle.
 fn sequence(inverter: &Inverter) -> Figure {
     let wanted = vector(0.5 * inverter.vdc / 3.0_f64.sqrt(), 20.0_f64.to_radians());
@@ -102,7 +118,9 @@ fn on_times(wanted: (f64, f64), vdc: f64) -> (f64, f64) {
     (1.5 * wanted.0 / vdc - 0.5 * second, second)
 }
 
-fn accuracy(inverter: &Inverter, outcome: &mut Outcome) -> Table {
+/// Measures the mean voltage inside the largest circle, the angle of a voltage that is three times too long (off where pulses are
+/// dropped or extended because they are too short to be made), and the on-times against those by Table 2. Without dead-time compensation.
+fn accuracy(inverter: &Inverter, outcome: &mut Outcome) {
     let circle = inverter.vdc / 3.0_f64.sqrt();
     let (mut error, mut turned, mut time) = (0.0_f64, 0.0_f64, 0.0_f64);
     for k in 0..3600 {
@@ -125,19 +143,7 @@ fn accuracy(inverter: &Inverter, outcome: &mut Outcome) -> Table {
             time = time.max((by_table.0 - by_counts.0).abs()).max((by_table.1 - by_counts.1).abs());
         }
     }
-    let time_us = time * 1e6 * f64::from(PERIOD_S);
     outcome.metrics.set("voltage_error_max_v", error);
     outcome.metrics.set("limited_angle_error_max_deg", turned);
-    outcome.metrics.set("on_time_difference_max_us", time_us);
-    let mut table = Table::new("The modulator of the drive", &["check", "largest", "unit"]);
-    let count = inverter.vdc / inverter.top;
-    for (check, value, unit) in [
-        ("mean voltage of a period against the one wanted, inside the circle", error, "V"),
-        ("angle of a voltage that is three times too long, after limiting", turned, "°"),
-        ("on-times T1 and T2 against those by Table 2", time_us, "µs"),
-        ("for comparison: one count of the timer", count, "V"),
-    ] {
-        table.row([Cell::from(check), Cell::significant(value, 2), Cell::from(unit)]);
-    }
-    table.note("Without dead-time compensation. The limited angle is off where pulses are dropped or extended because they are too short to be made.")
+    outcome.metrics.set("on_time_difference_max_us", time * 1e6 * f64::from(PERIOD_S));
 }

@@ -1,8 +1,8 @@
 //! The design of the current controllers in the w plane, and its margins with all parts of the actual loop.
 
-use drive_core::filter::{BPF, LPF};
+use drive_core::filter::BPF;
 use drive_settings::tuning::{
-    CurrentLoopDesign, DELAY, RuleDesign, design_current_loop, motor_plant, pi_response, rule_3_8,
+    CurrentLoopDesign, RuleDesign, design_current_loop, motor_plant, pi_response, rule_3_8,
 };
 
 use crate::prelude::*;
@@ -45,7 +45,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (_, identified, rule, _) = loops[0];
     outcome.figures.push(w_plane(identified, rule));
     outcome.tables.push(margin_table(&loops));
-    outcome.figures.push(real_loop(&loops[1].3, physical));
     // Section 2.5: the crossover of the rule beside the lower edge of BPF.
     let edges = crate::filters::edges_hz(&BPF, -0.6);
     outcome.metrics.set("bpf_lower_edge_hz", edges[0]);
@@ -55,9 +54,12 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.compared.push(beside("Figure 24", "crossover, fictitious").recomputed(hz(rule.v)));
     outcome.compared.push(beside("Figure 25", at).recomputed(gain));
     outcome.compared.push(named("loop_below_bpf").recomputed(hz(rule.v) < edges[0]));
+    let (k_ft, t_ft) = (physical.k / (1.0 - physical.p), -1e3 * PERIOD_S / physical.p.ln());
+    outcome.compared.push(beside("Eq. 3.20", "k_FT").recomputed(k_ft));
+    outcome.compared.push(beside("Eq. 3.22", "T_FT").recomputed(t_ft));
     let values = [
         ("pole_hz", -physical.p.ln() * RATE / std::f64::consts::TAU),
-        ("factor", physical.k / (1.0 - physical.p) / printed("Eq. 3.20", "k_FT")),
+        ("factor", k_ft / printed("Eq. 3.20", "k_FT")),
     ];
     texts::add_remarks(&mut outcome, "pi-design", &values);
     Ok(outcome)
@@ -116,41 +118,4 @@ fn margin_table(loops: &[(&str, FirstOrder, RuleDesign, CurrentLoopDesign)]) -> 
         })
     });
     texts::table("pi-design", "margins").records(rows)
-}
-
-fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
-    let open_loop = |k_c: f64| {
-        move |w: f64| {
-            pi_response(k_c, design.z_c, w)
-                * physical.response(w)
-                * LPF.response(w)
-                * Complex64::cis(-DELAY * w)
-        }
-    };
-    let (rule, used) = (open_loop(design.rule_k_c), open_loop(design.k_c));
-    let grid = frequencies(5.0, 2900.0, 1200);
-    let bode = Bode { hz: &grid, label: "frequency (Hz)", shown: |hz| hz };
-    let names = [
-        format!("by the rule, kc = {:.1}", design.rule_k_c),
-        format!("used, kc = {:.1}", design.k_c),
-    ];
-    let (mut gain, mut phase) = bode.panels([(&names[0], &rule), (&names[1], &used)]);
-    // The phases are the same: a dashed line, so that the rule stays visible behind the other.
-    for panel in [&mut gain, &mut phase] {
-        panel.series[0].style = Style::Reference;
-    }
-    let sensitivity = |l: &dyn Fn(f64) -> Complex64| {
-        grid.iter().map(|&hz| (hz, 1.0 / (Complex64::ONE + l(omega_t(hz))).norm())).collect()
-    };
-    let ends = |level: f64| vec![(grid[0], level), (grid[grid.len() - 1], level)];
-    let sensitivity = Panel::new("frequency (Hz)", "|1/(1 + L)|")
-        .log_x()
-        .y_range(0.0, 3.0)
-        .with(Series::reference(&*names[0], sensitivity(&rule)))
-        .with(Series::line(&*names[1], sensitivity(&used)))
-        .with(Series::limit("largest allowed, 2.2", ends(2.2)));
-    texts::figure("pi-design", "real-loop")
-        .panel(gain.y_range(-60.0, 30.0).with(Series::limit("", ends(0.0))))
-        .panel(phase.with(Series::limit("", ends(-180.0))))
-        .panel(sensitivity)
 }

@@ -1,7 +1,7 @@
 //! Comparison of this project's constants with those of Barroso 2017, and results that follow from his numbers without a printed formula.
 
 use drive_core::carrier::CARRIER_SAMPLES;
-use drive_settings::tuning::rule_3_8;
+use drive_settings::tuning::{bisected, rule_3_8};
 use sim_bench::plant::InverterSettings;
 
 use crate::prelude::*;
@@ -26,8 +26,15 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let bound = printed("Figure 13", "bound of the relative difference");
     let within = |hz: &f64| 100.0 * (fictitious(*hz) / hz - 1.0) <= bound;
     let limit = (1..30_000).map(|n| 0.1 * f64::from(n)).take_while(within).last();
-    let limit = limit.unwrap_or(f64::NAN);
-    outcome.compared.push(named("difference_small_up_to").of_print(limit));
+    outcome.compared.push(named("difference_small_up_to").of_print(limit.unwrap_or(f64::NAN)));
+    // Frequency at which a plant with this pole has lost 3 dB.
+    let fast = |pole: &str| {
+        let plant = FirstOrder { k: 1.0, p: printed("section 2.6", pole) };
+        let gain = |omega_t: f64| plant.response(omega_t).norm() / plant.response(0.0).norm();
+        bisected((0.0, 3.0), 40, &|omega_t| gain(omega_t) > 0.5_f64.sqrt()).0
+    };
+    let twice = (fast("pole p_1") / fast("pole p_2") - 2.0).abs() < 0.5;
+    outcome.compared.push(named("twice_as_fast").recomputed(twice));
     outcome.figures.push(figure_13());
     position_loop(&mut outcome);
     Ok(outcome)

@@ -49,5 +49,9 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome, panel: Panel) -> Result
     }
     outcome.tables.push(table);
     outcome.metrics.set("right_frame_torque_ratio", torque[4] / torque[0]);
+    for (which, torque) in [("least", torque[0]), ("largest", torque[4])] {
+        let place = beside("Abstract", &format!("torque produced, {which}"));
+        outcome.compared.push(place.simulated(torque));
+    }
     Ok(panel.with(Series::line("frame right, shown by Eq. 2.10 with a wrong τ_r", trace)))
 }

@@ -36,7 +36,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     outcome.compared.extend([
         named("current_zero_at").unknown(unknown).simulated(zero_from(&ours)),
         named("current_saturates").of_print(at_start),
-        named("works_as_servo").simulated(swing(&ours) < 5.0),
+        named("works_as_servo").of_print(swing(&literal) < 5.0).simulated(swing(&ours) < 5.0),
     ]);
     let target = vec![(0.0, 1800.0), (SECONDS, 1800.0)];
     let stop = printed("Figure 37", "time at which the quadrature current is zero") / 1e3;

@@ -85,11 +85,8 @@ impl Erratum {
     }
 }
 
-/// Formats a number with as many decimals as another one, or as yes or no if the other is shown so.
+/// Formats a number with as many decimals as another one.
 pub(super) fn rounded(value: f64, like: &str) -> String {
-    if like == "yes" || like == "no" {
-        return if value == 0.0 { "no" } else { "yes" }.to_owned();
-    }
     let digits = like.split('e').next().unwrap_or(like);
     let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
     let text = if like.contains('e') {

@@ -34,7 +34,8 @@ impl Default for Evidence {
 }
 
 impl Evidence {
-    /// Adds the results of an experiment. If two experiments report a place, the columns are filled in turn.
+    /// Adds the results of an experiment. If two experiments report a place, the columns are filled in turn; the value
+    /// of a program goes before that of a formula.
     pub fn add(&mut self, experiment: &str, outcome: &Outcome) {
         for (name, value) in outcome.metrics.iter() {
             self.metrics.insert(format!("{experiment}/{name}"), value);
@@ -47,7 +48,7 @@ impl Evidence {
             };
             let known = self.compared.entry(place).or_insert_with(|| (Vec::new(), ours.clone()));
             known.0.push(experiment.to_owned());
-            known.1.recomputed = known.1.recomputed.or(ours.recomputed);
+            known.1.recomputed = ours.recomputed.or(known.1.recomputed);
             known.1.simulated = known.1.simulated.or(ours.simulated);
             known.1.used = known.1.used.or(ours.used);
             known.1.against = known.1.against.max(ours.against);
@@ -72,7 +73,8 @@ impl Evidence {
         self.metrics.get(name).copied()
     }
 
-    fn against(&self, place: usize) -> Against {
+    /// Returns the origin of our value of a place.
+    pub fn against(&self, place: usize) -> Against {
         self.compared.get(&place).map_or(Against::Nothing, |(_, ours)| ours.against)
     }
 
