@@ -12,11 +12,14 @@ use crate::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, S
 use crate::demodulators::tracked;
 use crate::injection_map::PP;
 use crate::prelude::*;
-use measure::{Record, SLOW, StepResponses};
+use measure::Record;
 use model::{Model, Pii, TABLE_6_A};
 
 /// Row of Table 6 for which section 3.11 designs the controller: 1.5 A.
 const DESIGN_ROW: usize = 2;
+/// Step lengths, samples, and noise, %, with which the post-processing filter alone is identified.
+const HOLDS: std::ops::RangeInclusive<usize> = 10..=20;
+const NOISES: [f64; 7] = [0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0];
 /// The printed zero, completed by the digit that seems to be missing.
 const LIKELY_Z_S: f64 = 0.99;
 /// Gain of band-pass and post-processing filter at dc.
@@ -30,19 +33,8 @@ struct IdentifiedPoint {
     record: Record,
     /// The models by equation error and by output error.
     models: [Model; 2],
-    steps: StepResponses,
-}
-
-impl IdentifiedPoint {
-    /// Signal per rad after the current has followed the angle.
-    fn slow_gain(&self) -> f64 {
-        self.steps.with_current[SLOW].iter().sum::<f64>() / SLOW.len() as f64
-    }
-
-    /// Signal per rad while the current is held.
-    fn held_gain(&self) -> f64 {
-        self.steps.alone[SLOW].iter().sum::<f64>() / SLOW.len() as f64
-    }
+    /// Signal per rad while the current is held, and after it has followed the angle.
+    steps: [f64; 2],
 }
 
 /// Runs the experiment: Section 3.11.
@@ -67,15 +59,19 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     outcome.tables.extend(all().map(|(s, points)| gains(s, points, context.config)));
     compared(&points, &mut outcome);
+    let table = post_filter(context, &mut outcome)?;
+    outcome.tables.push(table);
     let table = closed_loops(context, &points, &mut outcome)?;
     outcome.tables.push(table);
-    outcome.figures.extend(all().map(|(s, points)| fit_figure(s, &points[DESIGN_ROW])));
     outcome.figures.extend(all().map(|(s, points)| bode_figure(s, points)));
-    outcome.figures.extend(all().map(|(s, points)| step_figure(s, points)));
     let (literal, rest) = points.split_at(TABLE_6_A.len());
     let (least, most) = fits(&rest[..TABLE_6_A.len()]);
-    let values =
-        [("distance", distance(literal)), ("rectified_least", least), ("rectified_most", most)];
+    let apart = literal.iter().enumerate().map(|(row, point)| distance(&point.models[1], row));
+    let values = [
+        ("distance", apart.fold(0.0, f64::max)),
+        ("rectified_least", least),
+        ("rectified_most", most),
+    ];
     texts::add_remarks(&mut outcome, "angle-identification", &values);
     Ok(outcome)
 }
@@ -84,13 +80,13 @@ fn metrics(outcome: &mut Outcome, demodulation: &Demodulation, points: &[Identif
     let (m, demodulation) = (&mut outcome.metrics, demodulation.name());
     for (iq, p) in TABLE_6_A.iter().zip(points) {
         let name = |what: &str| format!("{demodulation}_{what}_iq_{iq}a");
-        m.set(name("fit_pct"), p.models[1].fit(&p.record).1);
+        m.set(name("fit_pct"), p.models[1].fit(&p.record));
         m.set(name("static_gain_milli"), p.models[1].static_gain() * 1e3);
-        m.set(name("held_gain_milli"), p.held_gain() * 1e3);
-        m.set(name("slow_gain_milli"), p.slow_gain() * 1e3);
+        m.set(name("held_gain_milli"), p.steps[0] * 1e3);
+        m.set(name("slow_gain_milli"), p.steps[1] * 1e3);
     }
-    let design = &points[DESIGN_ROW];
-    m.set(format!("{demodulation}_held_over_slow"), design.held_gain() / design.slow_gain());
+    let [held, slow] = points[DESIGN_ROW].steps;
+    m.set(format!("{demodulation}_held_over_slow"), held / slow);
 }
 
 /// Makes the table of the measured and predicted gains of the axis alone, and of axis and current together.
@@ -113,7 +109,7 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
             DemodulatorKind::Literal => [2f64.sqrt() * LEAK * iq, 0.0],
             _ => [scale * (flux_part + current_part), scale * flux_part],
         };
-        let (held, slow) = (p.held_gain(), p.slow_gain());
+        let [held, slow] = p.steps;
         let ratio = if predicted[1] == 0.0 { "-".into() } else { Cell::fixed(held / slow, 2) };
         table.record([
             ("iq (A)".to_owned(), Cell::fixed(*iq, 1)),
@@ -128,56 +124,29 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
     table
 }
 
-fn fit_figure(demodulation: &Demodulation, p: &IdentifiedPoint) -> Figure {
-    let shown = (0.5 * RATE_HZ) as usize;
-    let line = |y: &[f64]| {
-        y.iter().take(shown).enumerate().map(|(k, y)| (k as f64 / RATE_HZ, y * 1e3)).collect()
-    };
-    let (model, fit) = p.models[1].fit(&p.record);
-    let name = demodulation.name();
-    let title = format!("{name}: measured and by Eq. 3.43, iq = 1.5 A, fit {fit:.0} %");
-    let turn = p.record.u.iter().map(|u| u.to_degrees() / 1e3).collect::<Vec<_>>();
-    let signal = Panel::new("time (s)", format!("signal ({})", demodulation.unit()))
-        .with(Series::line("measured, mean of 6 periods", line(&p.record.y)))
-        .with(Series::reference("Eq. 3.43", line(&model)));
-    let turn = Panel::new("time (s)", "turn of the axis (°)").with(Series::line("u", line(&turn)));
-    Figure::new(format!("fit_{name}"), title, "Figure 34").panel(signal).panel(turn)
-}
-
 fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figure {
     let hz = frequencies(1.0, 600.0, 120);
     let bode = Bode { hz: &hz, label: "frequency (Hz)", shown: |hz| hz };
-    let identified = TABLE_6_A.iter().zip(points).map(|(iq, p)| (format!("{iq} A"), p.models[1]));
-    let printed = |(row, iq): (usize, &f64)| (format!("Table 6, {iq} A"), Model::printed(row));
-    let models = identified.chain(TABLE_6_A.iter().enumerate().map(printed));
+    let models = TABLE_6_A.iter().zip(points).enumerate().flat_map(|(row, (iq, p))| {
+        [(format!("{iq} A"), p.models[1]), (String::new(), Model::printed(row))]
+    });
     // The signals are printed in thousandths.
     let scaled = |m: Model| move |w: f64| Model { k: m.k * 1e3, ..m }.response(w);
-    let (gain, phase) = bode.panels(models.map(|(name, model)| (name, scaled(model))));
+    let (mut gain, mut phase) = bode.panels(models.map(|(name, model)| (name, scaled(model))));
+    for series in
+        [&mut gain, &mut phase].into_iter().flat_map(|p| p.series.iter_mut().skip(1).step_by(2))
+    {
+        (series.style, series.like_previous) = (Style::Points, true);
+        series.points = series.points.iter().step_by(6).copied().collect();
+    }
     let (name, unit) = (demodulation.name(), demodulation.unit());
-    let title = format!("{name}: identified, gain in {unit} per rad");
+    let title = format!("{name}: identified, and Table 6 (points), gain in {unit} per rad");
     Figure::new(format!("bode_{name}"), title, "Figure 35").panel(gain).panel(phase)
-}
-
-fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figure {
-    let panel = |of: &str, pick: fn(&IdentifiedPoint) -> &Vec<f64>| {
-        let y = format!("{of} ({} / rad)", demodulation.unit());
-        TABLE_6_A.iter().zip(points).fold(Panel::new("time (ms)", y), |panel, (iq, p)| {
-            // Mean over a period of the injection: the rest is ripple.
-            let mean = |c: &[f64]| c.iter().sum::<f64>() / c.len() as f64 * 1e3;
-            let point = |(n, c): (usize, _)| ((n as f64 * 5.0 + 2.0) / RATE_HZ * 1e3, mean(c));
-            let line = pick(p).chunks(5).enumerate().map(point).collect();
-            panel.with(Series::line(format!("iq = {iq} A"), line))
-        })
-    };
-    let title = format!("{}: answer to a step of the axis", demodulation.name());
-    Figure::new(format!("step_{}", demodulation.name()), title, "")
-        .panel(panel("axis alone", |p| &p.steps.alone))
-        .panel(panel("with the current", |p| &p.steps.with_current))
 }
 
 /// Compares Table 6 and Eq. 3.44 with the results of the printed chain on the simulated motor, and with a design for the printed plant.
 fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
-    let unknown = "the saliency of its motor and the amplitude of the sequence";
+    let unknown = "the length of the steps and the noise of its sequence";
     for (iq, point) in TABLE_6_A.iter().zip(points) {
         let model = point.models[1];
         let [pole, _] = model.poles();
@@ -205,6 +174,37 @@ fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
     outcome.metrics.set("literal_fit_most_pct", fit.1);
     outcome.compared.push(named("two_poles_predict").simulated(fit.0 > 80.0));
     outcome.compared.push(named("pii_for_1_5_a").of_print(largest(Pii::printed()) < 1.0));
+}
+
+/// Finds, for each row of Table 6, the step length and the noise with which Appendix A gives its poles for the post-processing filter
+/// alone, without a motor.
+fn post_filter(context: &Context<'_>, outcome: &mut Outcome) -> Result<Table, Error> {
+    let cases: Vec<(usize, f64)> =
+        HOLDS.flat_map(|hold| NOISES.map(|percent| (hold, percent))).collect();
+    let models = context.in_parallel("post filter", &cases, |_, &(hold, percent)| {
+        Ok(Model::identify(&measure::filter_alone(hold, percent / 100.0, context.seed))?[0])
+    })?;
+    let mut table = texts::table("angle-identification", "post_filter");
+    let mut largest = 0.0_f64;
+    for (row, iq) in TABLE_6_A.iter().enumerate() {
+        let off = |model: &Model| distance(model, row);
+        let all = cases.iter().zip(&models);
+        let Some(((hold, percent), model)) = all.min_by(|a, b| off(a.1).total_cmp(&off(b.1)))
+        else {
+            continue;
+        };
+        largest = largest.max(off(model));
+        let [pole, _] = model.poles();
+        table.record([
+            ("row of Table 6 (A)", Cell::fixed(*iq, 1)),
+            ("steps (samples)", Cell::fixed(*hold as f64, 0)),
+            ("noise (%)", Cell::fixed(*percent, 1)),
+            ("Re p", Cell::fixed(pole.re, 4)),
+            ("Im p", Cell::fixed(pole.im, 4)),
+        ]);
+    }
+    outcome.metrics.set("post_filter_distance", largest);
+    Ok(table)
 }
 
 /// Runs controllers in the closed loop: over the steps of Figure 38, and at constant speed.
@@ -256,16 +256,12 @@ fn closed_loops(
 
 /// Smallest and largest fit of Eq. 3.43, %.
 fn fits(points: &[IdentifiedPoint]) -> (f64, f64) {
-    let fits = points.iter().map(|p| p.models[1].fit(&p.record).1);
+    let fits = points.iter().map(|p| p.models[1].fit(&p.record));
     fits.fold((f64::MAX, f64::MIN), |(least, most), fit| (least.min(fit), most.max(fit)))
 }
 
-/// Largest distance of the poles from the poles of Table 6, in real or imaginary part.
-fn distance(points: &[IdentifiedPoint]) -> f64 {
-    let of = |(row, p): (usize, &IdentifiedPoint)| {
-        let [ours, printed] = [&p.models[1], &Model::printed(row)].map(Model::poles);
-        let apart = ours[0] - printed[0];
-        apart.re.abs().max(apart.im.abs())
-    };
-    points.iter().enumerate().map(of).fold(0.0, f64::max)
+/// Distance of the poles of a model from those of a row of Table 6, in real or imaginary part.
+fn distance(model: &Model, row: usize) -> f64 {
+    let apart = model.poles()[0] - Model::printed(row).poles()[0];
+    apart.re.abs().max(apart.im.abs())
 }

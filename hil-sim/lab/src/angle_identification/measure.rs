@@ -1,11 +1,14 @@
 //! Measurement of the response to a rotation of the injection axis, alone or with the current, while the encoder holds the orientation.
 
-use crate::identification::signals::Prbs;
+use drive_core::filter::{PP, SosState};
+
+use crate::identification::signals::{self, Prbs};
 use crate::prelude::*;
 
 /// Number of samples for which each value of the sequence (8 bits, as in section 3.10) is held: 10 ms, so that the
 /// excitation lies in the frequency range of the loop. If a value is held for one sample or for 3 ms, the delay of the
-/// filters, for which Eq. 3.43 has no term, dominates the fit: it is 50 % or less, and the gains are wrong by half.
+/// filters, for which Eq. 3.43 has no term, dominates the fit: it is 50 % or less, and the gains are wrong by half. The source
+/// states no length; its poles are those of shorter steps (see [`filter_alone`]).
 const HOLD: usize = 60;
 /// Periods of the sequence: one to settle; the others are averaged.
 const PERIODS: usize = 7;
@@ -15,11 +18,11 @@ pub const TURN: f64 = 0.052_36;
 /// Half of the encoder's step, counts of 0.072° electrical: 2° in either direction.
 const STEP_COUNTS: i32 = 28;
 /// Samples on each side of a step.
-pub const STEP_SAMPLES: usize = 360;
+const STEP_SAMPLES: usize = 360;
 /// Number of steps in either direction.
 const STEPS: usize = 200;
 /// Samples at which the slow gain is read: the current has followed, the flux (186 ms) has hardly changed.
-pub const SLOW: std::ops::Range<usize> = 240..360;
+const SLOW: std::ops::Range<usize> = 240..360;
 
 /// Record of the identification experiment: input and output over one period of the sequence, averaged.
 #[derive(Clone, Debug)]
@@ -59,20 +62,26 @@ pub fn sequence(mut rig: Rig) -> Result<Record, Error> {
     Ok(Record { u: bits.iter().flat_map(|&bit| [bit; HOLD]).collect(), y })
 }
 
-/// Responses to a step of the injection axis, signal per rad: of the axis alone, and with the current.
-#[derive(Clone, Debug)]
-pub struct StepResponses {
-    /// Step of the axis alone.
-    pub alone: Vec<f64>,
-    /// Step of the estimated flux angle, which moves axis and current.
-    pub with_current: Vec<f64>,
+/// Makes the record of the post-processing filter alone: the sequence with each value held for `hold` samples, and white noise, rms as a
+/// share of the rms of the output.
+pub fn filter_alone(hold: usize, noise: f64, seed: u64) -> Record {
+    let (mut prbs, mut state) = (Prbs::default(), SosState::default());
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let u: Vec<f64> = (0..Prbs::PERIOD).flat_map(|_| vec![prbs.step(); hold]).collect();
+    let output = u.repeat(2).into_iter().map(|u| f64::from(PP.step(&mut state, u as f32)));
+    let mut y: Vec<f64> = output.skip(u.len()).collect();
+    let rms = Stats::of(y.iter().copied()).rms();
+    // A uniform number up to `largest` has an rms of largest/√3.
+    y.iter_mut().for_each(|y| *y += signals::noise(&mut random, noise * rms * 3.0_f64.sqrt()).re);
+    Record { u, y }
 }
 
-/// Measures both step responses.
+/// Measures the signal per rad of a step of the injection axis, after the current has settled: of the axis alone, and of the estimated
+/// flux angle, which moves axis and current.
 ///
 /// # Errors
 /// If the drive refuses a command.
-pub fn steps(mut rig: Rig) -> Result<StepResponses, Error> {
+pub fn steps(mut rig: Rig) -> Result<[f64; 2], Error> {
     let size = f64::from(2 * STEP_COUNTS) * TURN_PER_COUNT;
     let alone = alternate(&mut rig, |rig, side, k| {
         if k == 0 {
@@ -98,18 +107,18 @@ pub fn steps(mut rig: Rig) -> Result<StepResponses, Error> {
         let signal = f64::from(telemetry.delta_i) + f64::from(telemetry.saliency);
         Ok((signal, -error.to_radians()))
     })?;
-    Ok(StepResponses { alone, with_current })
+    Ok([alone, with_current])
 }
 
 /// Electrical angle of a count of the encoder of the default drive: two pole pairs, 10 000 counts.
 const TURN_PER_COUNT: f64 = 2.0 * std::f64::consts::TAU / 10_000.0;
 
 /// Steps between the two sides many times; returns the mean change of the signal divided by the mean change of the
-/// angle.
+/// angle, both at [`SLOW`].
 fn alternate(
     rig: &mut Rig,
     mut one: impl FnMut(&mut Rig, f64, usize) -> Result<(f64, f64), Error>,
-) -> Result<Vec<f64>, Error> {
+) -> Result<f64, Error> {
     let (mut signal, mut angle) = (vec![0.0; STEP_SAMPLES], 0.0);
     for n in 0..2 * STEPS + 1 {
         let side = if n % 2 == 0 { 1.0 } else { -1.0 };
@@ -127,5 +136,5 @@ fn alternate(
     let angle = angle / SLOW.len() as f64;
     // The signal goes from -y to y for angles from -x to x; before a step it has the value of the opposite side.
     let end = SLOW.map(|k| signal[k]).sum::<f64>() / SLOW.len() as f64;
-    Ok(signal.iter().map(|y| 0.5 * (y + end) / angle).collect())
+    Ok(SLOW.map(|k| 0.5 * (signal[k] + end) / angle).sum::<f64>() / SLOW.len() as f64)
 }

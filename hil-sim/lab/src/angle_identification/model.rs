@@ -85,14 +85,13 @@ impl Model {
         y
     }
 
-    /// Returns the model's output over a period of the sequence, and the quality of the fit: 100 % minus the rms error
-    /// divided by the rms of the signal.
-    pub fn fit(&self, record: &Record) -> (Vec<f64>, f64) {
+    /// Returns the quality of the fit over a period of the sequence: 100 % minus the rms error divided by the rms of the signal.
+    pub fn fit(&self, record: &Record) -> f64 {
         let n = record.u.len();
         let y = self.simulate(&record.u.repeat(3)).split_off(2 * n);
         let square = |of: &dyn Fn(usize) -> f64| (0..n).map(|k| of(k).powi(2)).sum::<f64>();
         let left = square(&|k| record.y[k] - y[k]) / square(&|k| record.y[k]);
-        (y, 100.0 * (1.0 - left.sqrt()))
+        100.0 * (1.0 - left.sqrt())
     }
 
     /// Returns the gain at dc, per rad.
