@@ -40,13 +40,18 @@ fn every_printed_value_has_a_verdict_and_the_errata_hold() {
         [11, 0, 0, 139, 12, 50, 0],
     ];
     assert_eq!(counts, [s1, s0]);
-    // Each section has a value that a change of the program can make differ.
+    let k_ft = place_of("S1", "Eq. 3.20", "k_FT").expect("Eq. 3.20");
+    assert_eq!(EVIDENCE.verdict(k_ft).0, Class::Differs);
+}
+
+/// Each section has a value that a change of the program can make differ.
+#[test]
+#[ignore = "a table of the documents: cargo xtask test"]
+fn every_printed_section_reads_the_program() {
     let reads = |k: &usize| EVIDENCE.against(*k) >= Against::Program;
     let read: Vec<_> = (0..PRINTED.len()).filter(reads).map(|k| &PRINTED[k].chapter).collect();
     let unread: Vec<_> = PRINTED.iter().filter(|p| !read.contains(&&p.chapter)).collect();
     assert!(unread.is_empty(), "{unread:?}");
-    let k_ft = place_of("S1", "Eq. 3.20", "k_FT").expect("Eq. 3.20");
-    assert_eq!(EVIDENCE.verdict(k_ft).0, Class::Differs);
 }
 
 /// Returns the verdict on a value that stands beside a printed value of a source, together with the formula of the list.

@@ -73,6 +73,8 @@ struct File {
     /// Quantities of the formulas, each computed from those before it.
     #[serde(default)]
     names: Vec<[String; 2]>,
+    /// Short name of the chapter of each figure, by number.
+    figures: HashMap<String, String>,
     chapter: Vec<Chapter>,
 }
 
@@ -154,6 +156,15 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
         }
     }
     all
+});
+
+/// The chapter of each figure, by source and number.
+pub(crate) static FIGURES: LazyLock<HashMap<String, String>> = LazyLock::new(|| {
+    let of = |File { source, figures, .. }: File| {
+        let chapters = figures.into_iter();
+        chapters.map(move |(number, id)| (format!("{source} {number}"), id))
+    };
+    files().flat_map(of).collect()
 });
 
 /// The quantities of the formulas, by source.

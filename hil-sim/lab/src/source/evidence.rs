@@ -2,22 +2,20 @@
 
 use std::collections::HashMap;
 
-use sim_bench::outcome::{Against, Cell, Compared, Figure, Outcome, Table};
+use sim_bench::outcome::{Against, Cell, Compared, Outcome, Table};
 
 use super::errata::{ERRATA, Erratum, OWN, rounded};
-use super::{Class, Kind, PRINTED, Printed, Verdict, place_of, value_of, verdict};
+use super::{Class, FIGURES, Kind, PRINTED, Printed, Verdict, place_of, value_of, verdict};
 use crate::texts;
 
 /// Results of the experiments.
 pub struct Evidence {
     /// Compared values by index in [`PRINTED`], with the experiments that report them.
     compared: HashMap<usize, (Vec<String>, Compared)>,
-    /// Metrics by `EXPERIMENT/METRIC`.
-    metrics: HashMap<String, f64>,
     /// Comparisons with a value that is not in the list.
     pub astray: Vec<String>,
-    /// Figures of the sources, each with its experiment.
-    figures: Vec<(String, Figure)>,
+    /// The experiments by name.
+    runs: Vec<(String, Outcome)>,
 }
 
 /// Values that follow from the print itself; experiments add theirs.
@@ -29,7 +27,7 @@ impl Default for Evidence {
             Some((place, (Vec::new(), ours.of_print(value))))
         };
         let compared = PRINTED.iter().enumerate().filter_map(of).collect();
-        Self { compared, metrics: HashMap::new(), astray: Vec::new(), figures: Vec::new() }
+        Self { compared, astray: Vec::new(), runs: Vec::new() }
     }
 }
 
@@ -37,9 +35,6 @@ impl Evidence {
     /// Adds the results of an experiment. If two experiments report a place, the columns are filled in turn; the value
     /// of a program goes before that of a formula.
     pub fn add(&mut self, experiment: &str, outcome: &Outcome) {
-        for (name, value) in outcome.metrics.iter() {
-            self.metrics.insert(format!("{experiment}/{name}"), value);
-        }
         for ours in &outcome.compared {
             let Compared { source, place, quantity, .. } = ours;
             let Some(place) = place_of(source, place, quantity) else {
@@ -53,9 +48,7 @@ impl Evidence {
             known.1.used = known.1.used.or(ours.used);
             known.1.against = known.1.against.max(ours.against);
         }
-        let shown = |figure: &&Figure| figure.source.contains("Figure");
-        let figures = outcome.figures.iter().filter(shown).cloned();
-        self.figures.extend(figures.map(|figure| (experiment.to_owned(), figure)));
+        self.runs.push((experiment.to_owned(), outcome.clone()));
     }
 
     /// Returns the experiments that report a place; none for values that follow from the print itself.
@@ -70,7 +63,8 @@ impl Evidence {
 
     /// Returns a metric by `EXPERIMENT/METRIC`.
     pub fn metric(&self, name: &str) -> Option<f64> {
-        self.metrics.get(name).copied()
+        let (experiment, metric) = name.split_once('/')?;
+        self.runs.iter().find(|run| run.0 == experiment)?.1.metrics.get(metric)
     }
 
     /// Returns the origin of our value of a place.
@@ -210,28 +204,34 @@ impl Evidence {
                 }
             }
         }
-        let mut index = Table::new("Figures of the sources", &[]);
+        let mut index = Vec::new();
         for chapter in &mut chapters[1..] {
             let values = chapter.outcome.tables[0].rows.len() as f64;
             chapter.outcome.metrics.set("printed_values", values);
         }
-        for (experiment, figure) in &self.figures {
+        for (experiment, outcome) in &self.runs {
             let Some(&home) = homes.get(&**experiment) else { continue };
-            // The figure belongs to the chapter in which the source has it, if the list has values of that figure.
-            let number = figure.source.split([' ', ',']).nth(1).unwrap_or_default();
-            let place = format!("Figure {number}");
-            let is_there = |p: &&Printed| p.source == chapters[home].source && p.place == place;
-            let there = PRINTED.iter().find(is_there);
-            let at = there.and_then(|p| chapters.iter().position(|chapter| chapter.is_of(p)));
-            let chapter = &mut chapters[at.unwrap_or(home)];
-            index.record([
-                ("figure", Cell::from(&*figure.source)),
-                ("section", chapter.name.as_str().into()),
-                ("what it shows", figure.title.as_str().into()),
-            ]);
-            chapter.outcome.figures.push(figure.clone());
+            chapters[home].outcome.remarks.extend_from_slice(&outcome.remarks);
+            let source = chapters[home].source;
+            for figure in outcome.figures.iter().filter(|figure| figure.source.contains("Figure")) {
+                // The figure belongs to the chapter in which the source has it.
+                let number = figure.source.split([' ', ',']).nth(1).unwrap_or_default();
+                let id =
+                    FIGURES.get(&format!("{source} {number}")).map(|id| format!("{source}-{id}"));
+                let at = chapters.iter().position(|chapter| Some(&chapter.name) == id.as_ref());
+                let chapter = &mut chapters[at.unwrap_or(home)];
+                let row = [
+                    ("figure", Cell::from(&*figure.source)),
+                    ("section", chapter.name.as_str().into()),
+                    ("what it shows", figure.title.as_str().into()),
+                ];
+                index.push(((source, number.parse::<u32>().ok()), row));
+                chapter.outcome.figures.push(figure.clone());
+            }
         }
-        chapters[0].outcome.tables.push(index);
+        index.sort_by_key(|entry| entry.0);
+        let rows = index.into_iter().map(|(_, row)| row);
+        chapters[0].outcome.tables.push(Table::new("Figures of the sources", &[]).records(rows));
         chapters
     }
 
@@ -261,16 +261,7 @@ impl Evidence {
             let title = "Without a verdict, or no longer as the errata say";
             outcome.texts.push((title.into(), faults.join("\n")));
         }
-        let drift = |name: &str| {
-            self.metric(&format!("sensorless-position/drift_{name}")).unwrap_or(f64::NAN).abs()
-        };
-        let values = [
-            ("no_load", drift("no_load_deg_per_min")),
-            ("per_ampere", drift("deg_per_min_a")),
-            ("per_percent", drift("deg_per_min_a_per_pct_rr")),
-            ("learned", drift("learned_deg_per_min_a")),
-        ];
-        texts::add_remarks(&mut outcome, "sources", &values);
+        texts::add_remarks(&mut outcome, "sources", &[]);
         Chapter {
             name: "sources".into(),
             source: "S1, S0",
@@ -332,7 +323,7 @@ pub struct Chapter {
 impl Chapter {
     fn of(printed: &'static Printed) -> Self {
         let mut outcome = Outcome::default();
-        outcome.tables.push(Table::new(&printed.head(), &[]));
+        outcome.tables.push(Table::new(printed.head(), &[]));
         let name = format!("{}-{}", printed.source, printed.id);
         let about = printed.chapter.clone();
         Self { name, source: &printed.source, about, runs: Vec::new(), outcome }
