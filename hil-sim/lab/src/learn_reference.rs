@@ -1,5 +1,6 @@
 //! Saliency self-commissioning of the drive.
 
+use drive_core::learned::Fitted;
 use sim_bench::learning;
 
 use crate::prelude::*;
@@ -25,6 +26,20 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ]
     });
     outcome.tables.push(texts::table("learn-reference", "over_current").records(rows));
+    let row = |name: &str, value: f32, decimals, misfit: Cell, used: bool| {
+        let used = Cell::from(if used { "yes" } else { "no" });
+        let value = Cell::fixed(value.into(), decimals);
+        [("value", name.into()), ("found", value), ("misfit", misfit), ("used", used)]
+    };
+    let fitted =
+        |name: &str, f: Fitted| row(name, f.value, 5, Cell::fixed(f.misfit.into(), 5), f.accepted);
+    let rows = [
+        fitted("gain of sensor a over b, less one", learned.gain_mismatch),
+        fitted("saliency of the current (1/A)", learned.current_saliency),
+        row("saliency fixed to the flux", learned.flux_saliency, 4, "".into(), false),
+    ];
+    outcome.tables.push(texts::table("learn-reference", "others").records(rows));
+
     let m = &mut outcome.metrics;
     m.set("spread", learned.spread.into());
     m.set("ripple", learned.ripple.into());
