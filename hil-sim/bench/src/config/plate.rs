@@ -2,7 +2,7 @@
 //!
 //! Current and power of the nameplate, at its speed, determine two numbers of the circuit: magnetising reactance and rotor resistance. The
 //! others follow by rule: each leakage reactance is 0.09 of the base impedance V/(sqrt(3) I), and the stator has the resistance of the rotor.
-//! Of the motors in the folder `motors`, all but one have 0.5 to 2 times the estimated stator resistance, 0.6 to 1.1 times the rotor resistance
+//! All motors in the folder `motors` but one have 0.5 to 2 times the estimated stator resistance, 0.6 to 1.1 times the rotor resistance
 //! and 0.7 to 1.3 times the magnetising reactance. The circuit of the dissertation's motor does not give its nameplate.
 
 use std::f64::consts::TAU;

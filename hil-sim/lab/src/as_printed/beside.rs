@@ -13,7 +13,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome, panel: Panel) -> Result
     config.load.mode = LoadMode::Locked;
     let mut rig = Rig::started(&config, context.seed, Mode::Torque)?;
     let (start, tau_r) = (rig.time(), rig.plant.tau_r());
-    // The rotor flux over L_m by Eq. 2.10, for each share; the rotor frame stands still.
+    // The rotor flux over L_m by Eq. 2.10, for each share. The rotor does not turn.
     let mut flux = shares.map(|_| Complex64::ZERO);
     let (mut shown, mut torque, mut trace) = (Vec::new(), Vec::new(), Vec::new());
     for level in LEVELS_A {
