@@ -7,6 +7,7 @@ pub use std::time::{Duration, Instant};
 pub use clap::Args;
 pub use rand::{Rng, RngExt};
 pub use sim_bench::prelude::*;
+pub use sim_lab::texts;
 
 pub use crate::config::{Key, RangeKind, Value};
 pub use crate::error::{cut, message, parser_text, printable};

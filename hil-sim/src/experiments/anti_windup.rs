@@ -93,19 +93,14 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let immediate = largest_pole(&[K_C - 2.0, 1.0 - K_C * Z_C]);
     let delayed = largest_pole(&[-2.0, 1.0 + K_C, -K_C * Z_C]);
 
-    let mut table = Table::new("Unit step, limit 0.15", &[]);
+    let mut table = texts::table("anti-windup", "step");
     let cases = [
         ("without anti-windup", "plain", without(), immediate),
         ("with anti-windup", "anti_windup", with(), immediate),
         ("Eq. B.1 with its printed index", "printed_index", literal(f64::INFINITY), delayed),
         ("Eq. B.3 with its printed index", "printed_anti_windup", literal(LIMIT), delayed),
     ];
-    let mut figure = Figure::new(
-        "step",
-        "Unit step of an integrator: without anti-windup, with it, and with the index as printed: \
-         Eq. B.1, and Eq. B.3",
-        "Figure 40",
-    );
+    let mut figure = texts::figure("anti-windup", "step");
     for (name, key, controller, pole) in cases {
         let response = Response::of(controller, LIMIT);
         table.record([
@@ -132,18 +127,10 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
                 .with(Series::limit("", level(-LIMIT))),
         );
     }
-    outcome.tables.push(table.note(
-        "The source gives no numbers, only that u is nearly 1 where y reaches the reference, that \
-         the plain system is saturated most of the time, and that anti-windup cures it.",
-    ));
+    outcome.tables.push(table);
     outcome.figures.push(figure);
     compared(&mut outcome);
-    outcome.remarks.push(format!(
-        "Eq. B.1 and B.3 print u[k+1] on the left. Taken literally that is one more delay, and the \
-         example is unstable without any limit (largest pole {delayed:.4}). The immediate form, \
-         u[k] = u[k − 1] + K_c (e[k] − z_c e[k − 1]), gives the behaviour described for Figure 40; the drive \
-         uses that."
-    ));
+    texts::add_remarks(&mut outcome, "anti-windup", &[("largest_pole", delayed)]);
     Ok(outcome)
 }
 

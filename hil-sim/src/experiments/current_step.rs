@@ -50,11 +50,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let (nominal, larger) = plants();
     let z_c = printed("Eq. 3.38", "z_c");
-    let mut figure = Figure::new(
-        "step",
-        "Current after a unit step: plant of Eq. 3.34 (top) and with its pole 3 % larger (bottom)",
-        "Figures 26, 27",
-    );
+    let mut figure = texts::figure("current-step", "step");
     for (key, plant) in [("nominal", nominal), ("larger_pole", larger)] {
         // (z - 1)(z - p) + k_c k (z - z_c)
         let gain = printed("section 3.8", "k_c") * plant.k;

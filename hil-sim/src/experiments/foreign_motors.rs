@@ -267,7 +267,7 @@ impl Study for ForeignMotors {
             ("good", &salient, Record::is_good),
             ("good up to 60 Hz", &slow, Record::is_good),
         ];
-        let mut table = Table::new("Foreign motors", &[]);
+        let mut table = texts::table("foreign-motors", "motors");
         for (name, from, is) in rows {
             let count = some(from, is).len();
             let share = 100.0 * count as f64 / from.len() as f64;
@@ -279,7 +279,7 @@ impl Study for ForeignMotors {
                 ("share (%)", Cell::fixed(share, 1)),
             ]);
         }
-        outcome.tables.push(table.note("With a slope: saliency sensitivity above 0.035 /rad at the magnetising current; the lines below are of these. Good: all undisturbed runs to their end, within 2° rms."));
+        outcome.tables.push(table);
         let m = &mut outcome.metrics;
         m.set("motors", all.len() as f64);
         for (n, (name, _)) in Circuit::of([1.0; 5]).values().iter().enumerate() {

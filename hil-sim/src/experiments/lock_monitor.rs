@@ -84,11 +84,7 @@ impl Study for LockMonitor {
         self.starts(starts, &mut outcome);
         outcome.metrics.set("runs", self.runs as f64);
         outcome.remarks = assumptions(&self.config);
-        outcome.remarks.push(format!(
-            "The angle is forced off by turning the rotor flux of the motor. In time: on with an error \
-             of 15° or more for at most 0.5 s (1.5 s at 0.5 A), watched for 2 s. Speeds within \
-             ±{SPEED_RPM} rpm."
-        ));
+        texts::add_remarks(&mut outcome, "lock-monitor", &[("speed_rpm", SPEED_RPM)]);
         Ok(outcome)
     }
 }
@@ -148,8 +144,8 @@ impl LockMonitor {
             "longest (s)" => Cell::fixed(wrong(trials, 1.0), 3);
             "not in time" => count(missed(trials));
         ];
-        let title = "Angle forced off: how long it stays wrong";
-        outcome.tables.push(Table::of(title, &columns, parts.iter().enumerate()));
+        let table = texts::table("lock-monitor", "forced");
+        outcome.tables.push(Table::of(table, &columns, parts.iter().enumerate()));
         let late = all.iter().enumerate().filter(|(_, t)| !t.is_in_time()).collect();
         let heads = ["forced by (°)", "seed", "iq (A)", "speed (rpm)", "wrong for (s)"];
         outcome.tables.extend(self.listed("Not in time", &heads, late));
@@ -186,10 +182,7 @@ impl LockMonitor {
             ("rate per run, 95 % bound", Cell::significant(bound, 2)),
             ("largest loss seen", Cell::fixed(largest_loss, 2)),
         ];
-        outcome.tables.push(Table::new("False alarms", &[]).records([row]).note(
-            "A quarter each: constant torque within 150 rpm, within 300 rpm, the torque reversed \
-             within 150 rpm, a load step of 0.6 Nm on a free shaft whose speed is regulated.",
-        ));
+        outcome.tables.push(texts::table("lock-monitor", "false_alarms").records([row]));
         let heads = ["seed", "kind", "iq (A)", "speed (rpm)", "fault"];
         outcome.tables.extend(self.listed("Every false alarm", &heads, alarms));
         let mut panel = Panel::new("quadrature current (A)", "largest saliency loss in the run");
@@ -216,8 +209,7 @@ impl LockMonitor {
             ("latest after it (s)", Cell::fixed(latest, 3)),
             ("not in time", Cell::fixed(late.len() as f64, 0)),
         ];
-        let table = Table::new("Shaft driven past the limit, 50 to 2000 rpm/s", &[]).records([row]);
-        outcome.tables.push(table.note("The drive goes by its estimate, which is off by 50 rpm at most; a shaft that is accelerated against the torque of the drive loses its flux earlier."));
+        outcome.tables.push(texts::table("lock-monitor", "over_speed").records([row]));
         let heads = ["seed", "iq (A)", "rpm/s"];
         outcome.tables.extend(self.listed("Over-speed not in time", &heads, late));
     }

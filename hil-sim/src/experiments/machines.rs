@@ -182,8 +182,7 @@ impl Study for Machines {
         let panel = Panel::new("saliency fixed to the flux (%)", "angle error (°)")
             .with(Series::points("largest", points(Machine::largest)))
             .with(Series::points("rms", points(Machine::rms)));
-        let title = "Worst of 16 runs over the saliency of the machine";
-        outcome.figures.push(Figure::new("machines", title, "").panel(panel));
+        outcome.figures.push(texts::figure("machines", "machines").panel(panel));
         Ok(outcome)
     }
 }

@@ -80,14 +80,9 @@ impl Study for MonteCarlo {
             .with(Series::points("largest", points(|r| r.error.largest())))
             .with(Series::points("rms", points(|r| r.error.rms())))
             .with(Series::points("mean", points(|r| r.error.mean())));
-        let title = "Angle error of every run over its q-axis current";
-        outcome.figures.push(Figure::new("runs", title, "").panel(panel));
+        outcome.figures.push(texts::figure("monte-carlo", "runs").panel(panel));
         outcome.remarks = assumptions(&self.config);
-        outcome.remarks.push(format!(
-            "Speeds within ±{} rpm. Lost: beyond 45° at any time, or stopped by the drive; lost \
-             runs are in no other figure.",
-            self.bound
-        ));
+        texts::add_remarks(&mut outcome, "monte-carlo", &[("speed_rpm", self.bound)]);
         Ok(outcome)
     }
 }

@@ -28,12 +28,9 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "torque, compensated (% of Eq. 2.7)" => Cell::fixed(a.1 * 100.0, 2);
         "left in (%)" => Cell::fixed(without[n].1 * 100.0, 2);
     ];
-    let table = Table::of("Field orientation over speed", &columns, with.iter().enumerate());
-    outcome.tables.push(table.note(format!(
-        "iq = {} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m²/L_r belongs; \
-         the torque is compared with 3/2 P (L_m/L_r) ψ i_q.",
-        context.config.amperes(IQ_A)
-    )));
+    let iq_a = ("iq_a", context.config.amperes(IQ_A));
+    let table = texts::table_with("encoder-orientation", "orientation", &[iq_a]);
+    outcome.tables.push(Table::of(table, &columns, with.iter().enumerate()));
     let line = |name: &str, of: &[Orientation]| {
         Series::line(name, SPEEDS_RPM.into_iter().zip(of.iter().map(|x| x.0)).collect())
     };
@@ -45,8 +42,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let panel = Panel::new("speed (rpm)", "mean flux angle error (° electrical)")
         .with(line("delays compensated", with))
         .with(line("delays left in", without));
-    let figure = Figure::new("orientation", "Flux angle error over speed", "Eq. 2.10");
-    outcome.figures.push(figure.panel(panel));
+    outcome.figures.push(texts::figure("encoder-orientation", "orientation").panel(panel));
     Ok(outcome)
 }
 

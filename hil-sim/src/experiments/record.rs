@@ -120,10 +120,7 @@ fn held_table(all: &[Held], torque: &TorqueLimit) -> Table {
         "speed (rpm)" => Cell::fixed(held.speed.mean(), 2);
         "end" => Cell::from(held.fault.as_deref().unwrap_or("regulates"));
     ];
-    Table::of("The torque limit held", &columns, all.iter().enumerate()).note(
-        "First and last: means over the first and the last minute, or tenth of a shorter time than ten minutes. Torque: mean in relation to that of the \
-         current; it includes the shape of the error.",
-    )
+    Table::of(texts::table("record", "held"), &columns, all.iter().enumerate())
 }
 
 fn held_figure(course: &Course, all: &[Held]) -> Figure {

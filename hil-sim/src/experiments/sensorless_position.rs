@@ -144,11 +144,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "beside it (° rms)" => Cell::fixed(h.wander(), 2);
         "angle error rms (°)" => Cell::fixed(h.angle_error.rms(), 2);
     ];
-    let table = Table::of("Drift of a position that is held", &columns, held.iter().enumerate());
-    outcome.tables.push(table.note(
-        "Mechanical degrees; the drive holds its estimate of position 0, a free shaft turns against \
-         the load.",
-    ));
+    let table = texts::table("sensorless-position", "drift");
+    outcome.tables.push(Table::of(table, &columns, held.iter().enumerate()));
     outcome.figures.push(step_figure(&without, &with));
     outcome.figures.push(drift_figure(&held));
     Ok(outcome)
@@ -161,7 +158,7 @@ fn step_figure(without: &Record, with: &Record) -> Figure {
             .with(Series::line("without encoder", line(without)))
             .with(Series::line("with encoder", line(with)))
     };
-    Figure::new("step", "Position step without and with the encoder", "Figure 37")
+    texts::figure("sensorless-position", "step")
         .panel(panel("position (° mechanical)", "position_deg"))
         .panel(panel("seen − true (° mechanical)", "position_estimate_error_deg"))
         .panel(panel("speed (rpm)", "speed_rpm"))
@@ -170,8 +167,7 @@ fn step_figure(without: &Record, with: &Record) -> Figure {
 }
 
 fn drift_figure(held: &[HeldPosition]) -> Figure {
-    let title = "Rotor position while the drive holds its estimate of zero";
-    let mut figure = Figure::new("drift", title, "");
+    let mut figure = texts::figure("sensorless-position", "drift");
     for belief in BELIEFS {
         let pct = (belief.0 - 1.0) * 100.0;
         let learned = if belief.1 { ", learned" } else { "" };

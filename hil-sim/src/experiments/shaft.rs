@@ -231,10 +231,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "ends" => Cell::from(pair.1[0].end());
         "with an encoder" => Cell::from(pair.1[1].end());
     ];
-    let table = Table::of("Load on a free shaft", &columns, pairs.iter().enumerate()).note(
-        "Bound: load times delay of the speed loop, divided by the time in which the rated torque accelerates the inertia to the rated speed. Loads in percent of the rated torque, or of 90 % of the torque that the drive allows if that is smaller.",
-    );
-    outcome.tables.push(table);
+    let table = texts::table("shaft", "loads");
+    outcome.tables.push(Table::of(table, &columns, pairs.iter().enumerate()));
     outcome.faults.extend(pairs.iter().filter_map(|(case, [seen, _])| {
         let fault = seen.fault?;
         let (name, load, speed) = (case.name(), 100.0 * case.load, 100.0 * case.speed);

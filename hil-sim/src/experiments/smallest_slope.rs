@@ -83,10 +83,8 @@ impl Study for SmallestSlope {
             head.into_iter().chain(step.summary.cells())
         };
         let mut outcome = Outcome::default();
-        outcome.tables.push(Table::new("Decreasing saliency", &[]).records(steps.iter().map(row)).note(
-            "Share: of the saturation of the main flux and of the teeth; with plant a, of saliency.a_psi. Slope: dq/de without load, \
-             of the motor, from its equations. A step works if every run is accepted and none is lost, wrong without detection, or stopped.",
-        ));
+        let table = texts::table("smallest-slope", "steps").records(steps.iter().map(row));
+        outcome.tables.push(table);
         let m = &mut outcome.metrics;
         if let Some(last) = steps.iter().take_while(|step| step.works()).last() {
             m.set("smallest_share", last.share);
@@ -104,8 +102,7 @@ impl Study for SmallestSlope {
             .with(points("largest", |s| s.error().largest()))
             .with(points("99 %", |s| s.p99_deg()))
             .with(points("rms", |s| s.error().rms()));
-        let title = "Angle error over the saliency sensitivity";
-        outcome.figures.push(Figure::new("slope", title, "").panel(panel));
+        outcome.figures.push(texts::figure("smallest-slope", "slope").panel(panel));
         Ok(outcome)
     }
 }

@@ -58,7 +58,7 @@ fn measure(config: &Config, drive: &Drive, point: Point, seed: u64) -> Result<Me
 
 fn outcome(config: &Config, limit: &TorqueLimit, measured: &[(Point, Measured)]) -> Outcome {
     let mut outcome = Outcome::default();
-    let mut table = Table::new("Largest torque", &[]);
+    let mut table = texts::table("torque-envelope", "largest");
     let mut figure = Figure::new("envelope", "Largest torque over the speed", "");
     let volts = |link: f64| format!("{:.0} V", link * config.inverter.dc_link_v);
     let at = |sign: f64, link: f64| {
@@ -102,14 +102,10 @@ fn outcome(config: &Config, limit: &TorqueLimit, measured: &[(Point, Measured)])
     m.set("points_lost", measured.iter().filter(|(_, m)| m.is_none()).count() as f64);
     let peak = measured.iter().filter_map(|(_, m)| Some((*m)?.1)).fold(0.0, f64::max);
     m.set("current_peak_a", peak);
-    outcome.tables.push(table.note("-: the drive did not start, or did not regulate to the end."));
+    outcome.tables.push(table);
     outcome.figures.push(figure);
     outcome.remarks = assumptions(config);
     outcome.remarks.push(limit.text(config));
-    outcome.remarks.push(format!(
-        "Where neither `sequence.i_d` nor `sequence.flux=high` is set, this experiment sets the magnetising current with plant a to \
-         {:.2} A.",
-        config.amperes(I_D_A)
-    ));
+    texts::add_remarks(&mut outcome, "torque-envelope", &[("i_d_a", config.amperes(I_D_A))]);
     outcome
 }

@@ -141,11 +141,7 @@ fn table(config: &Config, cases: &[Case], seen: &[Seen], m: &mut Metrics) -> Tab
     m.set("overshoot_pct", 100.0 * largest(&|rise| rise.current.overshoot()));
     m.set("peak_pct_of_trip", 100.0 * largest(&|rise| rise.peak_a / trip));
     m.set("angle_error_max_deg", largest(&|rise| rise.angle_deg));
-    Table::of("Torque steps over the speed", &columns, seen.iter().enumerate()).note(
-        "Means over steps at all ten samples of an injection period. Limit: the shortest time in which the voltage of the dc link drives \
-         the q-axis current, with the d-axis current free, and 1.5 periods. A negative torque generates. Beyond: the measured time \
-         minus 1.5 times the limit.",
-    )
+    Table::of(texts::table("torque-rise", "steps"), &columns, seen.iter().enumerate())
 }
 
 fn figure(cases: &[Case], seen: &[Seen]) -> Figure {

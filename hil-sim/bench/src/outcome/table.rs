@@ -50,7 +50,7 @@ impl Table {
 
     /// Makes a table with a row for each record; the columns get the record and its number.
     pub fn of<'a, R: 'a>(
-        title: impl Into<String>,
+        table: impl Into<Self>,
         columns: &[Column<'_, R>],
         records: impl IntoIterator<Item = (usize, &'a R)>,
     ) -> Self {
@@ -59,7 +59,7 @@ impl Table {
         };
         let heads = columns.iter().map(|column| column.head.to_owned()).collect();
         let rows = records.into_iter().map(row).collect();
-        Self { title: title.into(), columns: heads, rows, note: String::new() }
+        Self { columns: heads, rows, ..table.into() }
     }
 
     /// Sets the note below the table.
@@ -82,6 +82,13 @@ impl Table {
             "mean angle error (°)" => of_level(step.angle_error_mean_deg, 2);
         ];
         Self::of("Levels", &columns, steps.iter().enumerate())
+    }
+}
+
+/// A title makes a table without rows.
+impl<T: Into<String>> From<T> for Table {
+    fn from(title: T) -> Self {
+        Self { title: title.into(), ..Self::default() }
     }
 }
 

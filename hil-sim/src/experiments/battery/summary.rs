@@ -177,8 +177,7 @@ pub fn silent(trials: &[Trial], disturbances: impl Fn(usize) -> String) -> Table
         "disturbances" => Cell::from(disturbances(number));
     ];
     let silent = trials.iter().enumerate().filter(|(_, trial)| trial.is_silent());
-    Table::of("Undetected errors", &columns, silent)
-        .note("Disturbances: those of the page Statistics, relative to their full sizes.")
+    Table::of(texts::table("battery", "undetected"), &columns, silent)
 }
 
 /// Draws rms and largest error of every run, by its number.
