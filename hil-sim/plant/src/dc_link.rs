@@ -127,7 +127,7 @@ impl Plant {
     /// capacitor it does the same as [`Self::set_dc_link`].
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
+    /// [`PlantError`] outside 0 to 1000 V.
     pub fn set_mains(&mut self, peak: f64) -> Result<(), PlantError> {
         let held = self.dc_link();
         self.set_dc_link(peak)?;

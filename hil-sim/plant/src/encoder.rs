@@ -39,7 +39,7 @@ impl Encoder {
     /// Makes the encoder with these settings.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`].
+    /// [`PlantError`].
     pub fn new(settings: &EncoderSettings) -> Result<Self, PlantError> {
         settings.check()?;
         let counts_per_radian = 4.0 * f64::from(settings.lines) / TAU;

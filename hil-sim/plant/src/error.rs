@@ -2,43 +2,30 @@
 
 use std::ops::RangeInclusive;
 
-/// A setting that the plant refuses.
+/// A setting that the plant refuses: its value is outside the range, or not a number.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PlantError {
-    /// A value is outside its range or not a number.
-    #[error("{key} = {value} is outside the allowed range {min} to {max} {unit}")]
-    OutOfRange {
-        /// Name of the setting, for example `saliency.b1`.
-        key: &'static str,
-        /// The given value.
-        value: f64,
-        /// Smallest allowed value.
-        min: f64,
-        /// Largest allowed value.
-        max: f64,
-        /// Unit of the three values.
-        unit: &'static str,
-    },
-    /// The saliency vector could grow beyond 0.5, towards the singularity at 1; see
-    /// [`Machine::new`](super::Machine::new).
-    #[error(
-        "{key} = {value} is outside the allowed range {min} to {max} {unit}: \
-         with the other saliency settings |s| would reach {saliency:.3}, more than 0.5"
-    )]
-    TooSalient {
-        /// Name of the setting that contributes most.
-        key: &'static str,
-        /// The given value.
-        value: f64,
-        /// Smallest allowed value with the present other saliency settings.
-        min: f64,
-        /// Largest allowed value with the present other saliency settings.
-        max: f64,
-        /// Unit of the three values.
-        unit: &'static str,
-        /// Magnitude that the saliency vector would reach.
-        saliency: f64,
-    },
+#[error("{key} = {value} is outside the allowed range {min} to {max} {unit}{}", reached(.saliency))]
+pub struct PlantError {
+    /// Name of the setting, for example `saliency.b1`.
+    pub key: &'static str,
+    /// The given value.
+    pub value: f64,
+    /// Smallest allowed value.
+    pub min: f64,
+    /// Largest allowed value.
+    pub max: f64,
+    /// Unit of the three values.
+    pub unit: &'static str,
+    /// Magnitude that the saliency vector would reach, if it could grow beyond 0.5, towards the singularity at 1; see
+    /// [`Machine::new`](super::Machine::new). Then the setting is the one that contributes most, and the range is what
+    /// the present other saliency settings leave.
+    pub saliency: Option<f64>,
+}
+
+fn reached(saliency: &Option<f64>) -> String {
+    let text =
+        |s| format!(": with the other saliency settings |s| would reach {s:.3}, more than 0.5");
+    saliency.map(text).unwrap_or_default()
 }
 
 /// Refuses a value that is not finite or not in `range`.
@@ -51,5 +38,6 @@ pub(crate) fn check(
     if range.contains(&value) {
         return Ok(());
     }
-    Err(PlantError::OutOfRange { key, value, min: *range.start(), max: *range.end(), unit })
+    let (min, max) = (*range.start(), *range.end());
+    Err(PlantError { key, value, min, max, unit, saliency: None })
 }

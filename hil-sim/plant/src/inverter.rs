@@ -59,28 +59,14 @@ impl InverterSettings {
 /// The inverter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inverter {
+    /// Settings; dc-link voltage and dead time act as the fields below have them.
+    pub(crate) settings: InverterSettings,
     /// Dc-link voltage, V.
     pub(crate) vdc: f64,
     pub(crate) top: f64,
-    /// Pulses of each leg in a period.
-    pub(crate) pulses: u16,
-    timer_top: u16,
     /// Dead time, s.
     pub(crate) dead_time: f64,
-    /// Part of the dead time that the drive does not know, us.
-    extra_us: f64,
-    /// Propagation delay, s.
-    pub(crate) propagation: f64,
-    pub(crate) residual: f64,
-    /// Capacitance of the output node, F.
-    pub(crate) capacitance: f64,
     pub(crate) sign: SmoothSign,
-    /// Resistance of a conducting switch, ohm.
-    pub(crate) on_resistance: f64,
-    /// Resistance of each phase, ohm, and dead time of each leg, s, in excess of the common values.
-    pub(crate) resistances: [f64; 3],
-    pub(crate) more_dead_time: [f64; 3],
-    pub(crate) switched: bool,
     /// Compare values of the previous period.
     pub(crate) previous: Compare,
 }
@@ -89,7 +75,7 @@ impl Inverter {
     /// Makes the inverter with these settings, off.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`].
+    /// [`PlantError`].
     pub fn new(s: &InverterSettings) -> Result<Self, PlantError> {
         s.check()?;
         let most = if s.switched { 0.0 } else { 10.0 };
@@ -97,20 +83,11 @@ impl Inverter {
             check("inverter.more_ohm, inverter.more_dead_time_us", *more, -most..=most, "")?;
         }
         let mut inverter = Self {
+            settings: *s,
             vdc: 0.0,
             top: 0.0,
-            pulses: 1,
-            timer_top: s.timer_top,
             dead_time: 0.0,
-            extra_us: s.extra_dead_time_us,
-            propagation: s.propagation_us * 1e-6,
-            residual: s.residual_v,
-            capacitance: s.node_capacitance,
             sign: SmoothSign::new(s.smoothing_a),
-            on_resistance: s.on_resistance,
-            resistances: s.more_ohm,
-            more_dead_time: s.more_dead_time_us.map(|us| us * 1e-6),
-            switched: s.switched,
             previous: Compare::OFF,
         };
         inverter.set_dc_link(s.vdc)?;
@@ -121,14 +98,14 @@ impl Inverter {
 
     /// Changes the number of pulses in a period.
     pub fn set_pulses(&mut self, pulses: u16) {
-        self.pulses = pulses.max(1);
-        self.top = f64::from(self.timer_top / self.pulses);
+        self.settings.pulses = pulses.max(1);
+        self.top = f64::from(self.settings.timer_top / self.settings.pulses);
     }
 
     /// Changes the dc-link voltage, V.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
+    /// [`PlantError`] outside 0 to 1000 V.
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
         check("inverter.vdc", vdc, 0.0..=1000.0, "V")?;
         self.vdc = vdc;
@@ -138,10 +115,10 @@ impl Inverter {
     /// Changes the dead time, us; the extra dead time is added to it.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`] outside 0 to 10 us.
+    /// [`PlantError`] outside 0 to 10 us.
     pub fn set_dead_time(&mut self, us: f64) -> Result<(), PlantError> {
         check("inverter.dead_time_us", us, 0.0..=10.0, "us")?;
-        self.dead_time = (us + self.extra_us) * 1e-6;
+        self.dead_time = (us + self.settings.extra_dead_time_us) * 1e-6;
         Ok(())
     }
 
@@ -152,7 +129,7 @@ impl Inverter {
             return 0.0;
         }
         let magnitudes: f64 = phases(i).iter().map(|i| i.abs()).sum();
-        self.residual * magnitudes + 1.5 * self.on_resistance * square(i)
+        self.settings.residual_v * magnitudes + 1.5 * self.settings.on_resistance * square(i)
     }
 
     /// Fraction of the period for which each leg is commanded high.
@@ -163,29 +140,29 @@ impl Inverter {
 
     /// Computes the averages of a period of `period` seconds with these compare values, outputs on.
     pub(crate) fn averaged(&self, compare: &Compare, period: f64) -> Averaged {
-        let duties = self.duties(compare);
+        let (s, duties) = (&self.settings, self.duties(compare));
         let mut v = clarke(duties);
         if self.previous.enabled {
-            let blend = self.propagation / period;
+            let blend = s.propagation_us * 1e-6 / period;
             v += (clarke(self.duties(&self.previous)) - v) * blend;
         }
-        let pulses = f64::from(self.pulses);
+        let pulses = f64::from(s.pulses);
         // A pulse shorter than the dead time vanishes, so the dead time cannot take more than the pulse.
         let taken = |leg: usize, available: f64| {
-            let dead = (self.dead_time + self.more_dead_time[leg]) * pulses / period;
+            let dead = (self.dead_time + s.more_dead_time_us[leg] * 1e-6) * pulses / period;
             let switches = duties[leg] > 0.0 && duties[leg] < 1.0;
             if switches { self.vdc * dead.max(0.0).min(available) } else { 0.0 }
         };
-        let charge = self.capacitance * self.vdc;
+        let charge = s.node_capacitance * self.vdc;
         Averaged {
             inverse_knee: if charge > 0.0 { self.dead_time.max(1e-9) / charge } else { 0.0 },
-            residual: self.residual,
+            residual: s.residual_v,
             sign: self.sign,
-            on_resistance: self.on_resistance,
-            resistances: self.resistances,
+            on_resistance: s.on_resistance,
+            resistances: s.more_ohm,
             v: v * self.vdc,
-            lost: std::array::from_fn(|k| taken(k, duties[k]) + self.residual),
-            gained: std::array::from_fn(|k| taken(k, 1.0 - duties[k]) + self.residual),
+            lost: std::array::from_fn(|k| taken(k, duties[k]) + s.residual_v),
+            gained: std::array::from_fn(|k| taken(k, 1.0 - duties[k]) + s.residual_v),
         }
     }
 }

@@ -212,14 +212,6 @@ impl Plant {
         }
     }
 
-    /// Returns the motor with its shaft and state, if it is model A.
-    pub fn model_a(&self) -> Option<&MotorModel<Machine>> {
-        match &self.motor {
-            Motor::A(motor) => Some(motor),
-            Motor::Energy(_) => None,
-        }
-    }
-
     /// Returns the motor with its shaft and state, if it is the energy model.
     pub fn energy_model(&self) -> Option<&MotorModel<EnergyMachine>> {
         match &self.motor {
@@ -297,7 +289,7 @@ impl Plant {
     /// Changes the dc-link voltage, V. Behind a rectifier it changes both the present voltage and the peak of the rectified mains.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
+    /// [`PlantError`] outside 0 to 1000 V.
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
         self.around.inverter.set_dc_link(vdc)?;
         self.dc_link.nominal = vdc;
@@ -325,7 +317,7 @@ impl Plant {
     /// Changes the dead time, us.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`] outside 0 to 10 us.
+    /// [`PlantError`] outside 0 to 10 us.
     pub fn set_dead_time(&mut self, us: f64) -> Result<(), PlantError> {
         self.around.inverter.set_dead_time(us)
     }
@@ -333,7 +325,7 @@ impl Plant {
     /// Couples another load. A held speed applies at once; a free shaft continues at its present speed.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`] for its torque or speed.
+    /// [`PlantError`] for its torque or speed.
     pub fn set_load(&mut self, load: Load) -> Result<(), PlantError> {
         whichever!(&mut self.motor, motor => {
             motor.mechanics.set_load(load)?;
@@ -345,7 +337,7 @@ impl Plant {
     /// Changes the resistances of stator and rotor, ohm (a warmer motor), and keeps everything else.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`].
+    /// [`PlantError`].
     pub fn set_resistances(&mut self, rs: f64, rr: f64) -> Result<(), PlantError> {
         MachineSettings { rs, rr, ..MachineSettings::DEFAULT }.check()?;
         whichever!(&mut self.motor, motor => motor.machine.set_resistances(rs, rr));
@@ -385,7 +377,7 @@ impl Plant {
     /// Interrupts a phase between inverter and motor, 0 to 2, at once, or connects all.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`] for another number.
+    /// [`PlantError`] for another number.
     pub fn set_open_phase(&mut self, phase: Option<usize>) -> Result<(), PlantError> {
         if let Some(phase) = phase {
             error::check("open phase", phase as f64, 0.0..=2.0, "")?;

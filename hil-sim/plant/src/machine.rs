@@ -133,7 +133,6 @@ pub struct Machine {
     r_prime: f64,
     sigma_ls: f64,
     inv_sigma_ls: f64,
-    lm: f64,
     lr: f64,
     torque_factor: f64,
     two_a_psi: f64,
@@ -153,7 +152,7 @@ impl Machine {
     /// part grows with the flux.)
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`]; [`PlantError::TooSalient`].
+    /// [`PlantError`].
     pub fn new(m: &MachineSettings, s: &SaliencySettings) -> Result<Self, PlantError> {
         m.check()?;
         s.check()?;
@@ -173,7 +172,6 @@ impl Machine {
             r_prime: m.rs + m.rr * coupling * coupling,
             sigma_ls,
             inv_sigma_ls: 1.0 / sigma_ls,
-            lm: m.lm,
             lr,
             torque_factor: 1.5 * pole_pairs * coupling,
             two_a_psi: 2.0 * s.a_psi,
@@ -223,11 +221,6 @@ impl Machine {
             0.0
         };
         x.psi * x.psi * flux_part + x.i * x.i * current_part + self.stator_fixed
-    }
-
-    /// Rotor current, A, referred to the stator: `(psi - Lm i)/Lr`.
-    pub fn rotor_current(&self, x: &MachineState) -> Complex {
-        (x.psi - x.i * self.lm) / self.lr
     }
 
     /// `(alpha - j w) psi`, the flux decay in the stator frame.
@@ -333,5 +326,5 @@ fn refuse_singular(
         let rest = (SALIENCY_LIMIT - flux_part).max(0.0);
         ("saliency.b1", s.b1, rest / s.hold_a, "1/A")
     };
-    Err(PlantError::TooSalient { key, value, min: -max, max, unit, saliency })
+    Err(PlantError { key, value, min: -max, max, unit, saliency: Some(saliency) })
 }

@@ -66,8 +66,7 @@ impl MechanicsSettings {
 /// Coefficients of the equation of motion, `J dw/dt = Te - TL - B w`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mechanics {
-    inertia: f64,
-    friction: f64,
+    settings: MechanicsSettings,
     load: Load,
     load_torque: f64,
     /// 1/J if the shaft is free, otherwise 0.
@@ -78,7 +77,6 @@ pub struct Mechanics {
 /// Effects that most shafts do not have, with their state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extras {
-    settings: MechanicsSettings,
     coupling: Option<Coupling>,
     /// Torque that depends on the angle, in this period.
     by_angle: f64,
@@ -88,8 +86,7 @@ struct Extras {
 
 impl Extras {
     /// Torque of the stop that the shaft has reached: it pushes, but does not pull.
-    fn stop_torque(&self, angle: f64) -> f64 {
-        let s = &self.settings;
+    fn stop_torque(&self, s: &MechanicsSettings, angle: f64) -> f64 {
         let beyond = angle.abs() - s.stops;
         if s.stops == 0.0 || beyond <= 0.0 {
             return 0.0;
@@ -112,16 +109,15 @@ impl Mechanics {
     /// Makes the shaft with these settings.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`].
+    /// [`PlantError`].
     pub fn new(s: &MechanicsSettings) -> Result<Self, PlantError> {
         s.check()?;
         let coupling = (s.load_inertia > 0.0).then(Coupling::default);
         let plain =
             coupling.is_none() && (s.static_torque, s.once_torque, s.stops) == (0.0, 0.0, 0.0);
-        let extras = Extras { settings: *s, coupling, by_angle: 0.0, speed: 0.0 };
+        let extras = Extras { coupling, by_angle: 0.0, speed: 0.0 };
         let mut mechanics = Self {
-            inertia: s.inertia,
-            friction: s.friction,
+            settings: *s,
             load: Load::Locked,
             load_torque: 0.0,
             mobility: 0.0,
@@ -134,13 +130,13 @@ impl Mechanics {
     /// Couples another load.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`] for its torque or speed.
+    /// [`PlantError`] for its torque or speed.
     pub fn set_load(&mut self, load: Load) -> Result<(), PlantError> {
         match load {
             Load::Free { torque } => {
                 check("mechanics.load.torque", torque, -1000.0..=1000.0, "N m")?;
                 self.load_torque = torque;
-                self.mobility = 1.0 / self.inertia;
+                self.mobility = 1.0 / self.settings.inertia;
             }
             Load::Locked => self.mobility = 0.0,
             Load::Speed { speed } => {
@@ -169,7 +165,7 @@ impl Mechanics {
     /// Returns the acceleration, rad/s^2, caused by the electromagnetic `torque` at this mechanical speed.
     #[inline]
     pub fn acceleration(&self, torque: f64, speed: f64) -> f64 {
-        (torque - self.load_torque - self.friction * speed) * self.mobility
+        (torque - self.load_torque - self.settings.friction * speed) * self.mobility
     }
 
     /// Returns the mechanical speed of the inertia behind the elastic coupling, rad/s; none with a rigid shaft.
@@ -187,7 +183,8 @@ impl Mechanics {
     #[inline]
     pub(crate) fn begin_period(&mut self, angle: f64) {
         if let Some(extras) = &mut self.extras {
-            extras.by_angle = extras.settings.once_torque * angle.cos() + extras.stop_torque(angle);
+            let s = &self.settings;
+            extras.by_angle = s.once_torque * angle.cos() + extras.stop_torque(s, angle);
         }
     }
 
@@ -198,7 +195,7 @@ impl Mechanics {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
             return speed;
         };
-        let (s, at_load) = (&extras.settings, load + extras.by_angle);
+        let (s, at_load) = (&self.settings, load + extras.by_angle);
         let against = extras.coupling.as_mut().map_or(at_load, |coupling| {
             coupling.torque = s.stiffness * coupling.twist + s.damping * (speed - coupling.speed);
             coupling.torque
@@ -207,7 +204,7 @@ impl Mechanics {
         let rests = speed == 0.0 || extras.speed * speed < 0.0;
         let driven = torque - against;
         extras.speed = speed;
-        self.mobility = 1.0 / self.inertia;
+        self.mobility = 1.0 / self.settings.inertia;
         self.load_torque = against;
         if s.static_torque > 0.0 {
             if rests && driven.abs() <= s.static_torque {
@@ -228,7 +225,7 @@ impl Mechanics {
         };
         if let Some(coupling) = &mut extras.coupling {
             coupling.speed +=
-                h * (coupling.torque - load - extras.by_angle) / extras.settings.load_inertia;
+                h * (coupling.torque - load - extras.by_angle) / self.settings.load_inertia;
             coupling.twist += h * (speed - coupling.speed);
         }
     }

@@ -39,17 +39,23 @@ impl Around {
         period: f64,
     ) {
         motor.begin_period();
-        self.sensors.begin_period(period, self.inverter.pulses);
+        self.sensors.begin_period(period, self.inverter.settings.pulses);
         (self.taken, self.volt_seconds) = (0.0, Complex::ZERO);
         if !compare.enabled {
             self.freewheel(motor, period);
-        } else if self.inverter.switched {
+        } else if self.inverter.settings.switched {
             match self.open {
                 None => self.switched(All, motor, compare, period),
                 Some(open) => self.switched(|legs| Without(open, legs), motor, compare, period),
             }
         } else {
-            self.averaged(motor, compare, period);
+            // With an interrupted phase the code does not distinguish ideal from real switches.
+            let source = self.inverter.averaged(compare, period);
+            match self.open {
+                None if source.ideal() => self.averaged(&All(source), motor, period),
+                None => self.averaged(&All(RealSwitches(source)), motor, period),
+                Some(open) => self.averaged(&Without(open, RealSwitches(source)), motor, period),
+            }
         }
         self.inverter.previous = *compare;
     }
@@ -75,25 +81,9 @@ impl Around {
         }
     }
 
-    /// Uses the averages of the period as the source. With an interrupted phase the code does not distinguish ideal
-    /// from real switches.
+    /// Uses the averages of the period as the source.
     #[inline]
     fn averaged<M: MachineModel>(
-        &mut self,
-        motor: &mut MotorModel<M>,
-        compare: &Compare,
-        period: f64,
-    ) {
-        let source = self.inverter.averaged(compare, period);
-        match self.open {
-            None if source.ideal() => self.averaged_to(&All(source), motor, period),
-            None => self.averaged_to(&All(RealSwitches(source)), motor, period),
-            Some(open) => self.averaged_to(&Without(open, RealSwitches(source)), motor, period),
-        }
-    }
-
-    #[inline]
-    fn averaged_to<M: MachineModel>(
         &mut self,
         terminals: &impl Terminals,
         motor: &mut MotorModel<M>,
@@ -114,8 +104,8 @@ impl Around {
         period: f64,
     ) {
         let longest = period / f64::from(self.substeps);
-        for _ in 0..self.inverter.pulses {
-            let pulse_s = period / f64::from(self.inverter.pulses);
+        for _ in 0..self.inverter.settings.pulses {
+            let pulse_s = period / f64::from(self.inverter.settings.pulses);
             let pattern = switched::Pattern::new(&self.inverter, compare, pulse_s);
             for (duration, levels) in pattern.pieces() {
                 let steps = (duration / longest).ceil().max(1.0);

@@ -15,11 +15,6 @@ use crate::terminals::Source;
 
 /// Current below which a leg with both switches off has no defined level, A.
 const NO_CURRENT: f64 = 1e-9;
-/// Number of edges of one leg that matter in one period: two of this period, two of the previous period, one at the
-/// boundary.
-const EDGES: usize = 5;
-/// Number of times at which anything changes: two per edge and leg, and the end.
-const INSTANTS: usize = 3 * 2 * EDGES + 1;
 
 /// State of a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,51 +27,38 @@ pub(crate) enum Level {
     Off,
 }
 
-/// Commanded edges of one leg, in order of time.
-#[derive(Clone, Copy, Debug)]
-struct Leg {
-    /// Instant at which the edge takes effect (s from the start of the period), and whether the leg goes high.
-    edges: [(f64, bool); EDGES],
-    count: usize,
-}
+/// Commanded edges of one leg, in order of time: the instant at which the edge takes effect (s from the start of the
+/// period), and whether the leg goes high. Two of this period, two of the previous period and one at the boundary matter.
+#[derive(Clone, Debug)]
+struct Leg(Vec<(f64, bool)>);
 
 impl Leg {
     fn new(before: f64, now: f64, period: f64, delay: f64) -> Self {
-        let mut leg = Self { edges: [(0.0, false); EDGES], count: 0 };
-        leg.pulse(before, -period, period);
+        let mut edges = Self::pulse(before, -period, period);
         if (before >= 1.0) != (now >= 1.0) {
-            leg.push(0.0, now >= 1.0);
+            edges.push((0.0, now >= 1.0));
         }
-        leg.pulse(now, 0.0, period);
-        if leg.count == 0 {
+        edges.extend(Self::pulse(now, 0.0, period));
+        if edges.is_empty() {
             // An edge in the distant past.
-            leg.push(f64::NEG_INFINITY, now >= 1.0);
+            edges.push((f64::NEG_INFINITY, now >= 1.0));
         }
-        for (time, _) in &mut leg.edges {
-            *time += delay;
-        }
-        leg
+        edges.iter_mut().for_each(|(time, _)| *time += delay);
+        Self(edges)
     }
 
-    fn push(&mut self, time: f64, high: bool) {
-        self.edges[self.count] = (time, high);
-        self.count += 1;
-    }
-
-    fn pulse(&mut self, duty: f64, start: f64, period: f64) {
-        if duty > 0.0 && duty < 1.0 {
-            self.push(start + 0.5 * period * (1.0 - duty), true);
-            self.push(start + 0.5 * period * (1.0 + duty), false);
-        }
+    fn pulse(duty: f64, start: f64, period: f64) -> Vec<(f64, bool)> {
+        let edge = |share: f64| start + 0.5 * period * share;
+        let switches = duty > 0.0 && duty < 1.0;
+        if switches { vec![(edge(1.0 - duty), true), (edge(1.0 + duty), false)] } else { vec![] }
     }
 
     /// Returns the level at `time`.
     #[inline]
     fn level(&self, time: f64, dead_time: f64) -> Level {
-        let edges = &self.edges[..self.count];
-        let Some(&(edge, high)) = edges.iter().rev().find(|(edge, _)| *edge <= time) else {
+        let Some(&(edge, high)) = self.0.iter().rev().find(|(edge, _)| *edge <= time) else {
             // The time is before the first edge.
-            return if edges[0].1 { Level::Low } else { Level::High };
+            return if self.0[0].1 { Level::Low } else { Level::High };
         };
         match (time - edge < dead_time, high) {
             (true, _) => Level::Off,
@@ -87,11 +69,10 @@ impl Leg {
 }
 
 /// The instants of one period at which a leg changes its level.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Pattern {
     legs: [Leg; 3],
-    instants: [f64; INSTANTS],
-    count: usize,
+    instants: Vec<f64>,
     dead_time: f64,
 }
 
@@ -102,30 +83,21 @@ impl Pattern {
         let before =
             if inverter.previous.enabled { inverter.previous } else { Compare::LOW_SIDES_ON };
         let duty = |c: u16| f64::from(c) / inverter.top;
+        let delay = inverter.settings.propagation_us * 1e-6;
         let legs = [(before.a, compare.a), (before.b, compare.b), (before.c, compare.c)]
-            .map(|(before, now)| Leg::new(duty(before), duty(now), period, inverter.propagation));
-        let mut instants = [0.0; INSTANTS];
-        let mut count = 0;
-        for leg in &legs {
-            for &(edge, _) in &leg.edges[..leg.count] {
-                for instant in [edge, edge + inverter.dead_time] {
-                    if instant > 0.0 && instant < period {
-                        instants[count] = instant;
-                        count += 1;
-                    }
-                }
-            }
-        }
-        instants[count] = period;
-        count += 1;
-        instants[..count].sort_unstable_by(f64::total_cmp);
-        Self { legs, instants, count, dead_time: inverter.dead_time }
+            .map(|(before, now)| Leg::new(duty(before), duty(now), period, delay));
+        let edges = legs.iter().flat_map(|leg| &leg.0);
+        let changes = edges.flat_map(|(edge, _)| [*edge, edge + inverter.dead_time]);
+        let inside = changes.filter(|instant| *instant > 0.0 && *instant < period);
+        let mut instants: Vec<f64> = inside.chain([period]).collect();
+        instants.sort_unstable_by(f64::total_cmp);
+        Self { legs, instants, dead_time: inverter.dead_time }
     }
 
     /// Returns the pieces of the period: duration (s), and the levels of the legs.
     pub(crate) fn pieces(&self) -> impl Iterator<Item = (f64, [Level; 3])> + '_ {
         let mut start = 0.0;
-        self.instants[..self.count].iter().filter_map(move |&end| {
+        self.instants.iter().filter_map(move |&end| {
             let duration = end - start;
             let middle = 0.5 * (start + end);
             start = end;
@@ -167,8 +139,8 @@ impl Legs {
         Self {
             v: clarke(leg_voltages(levels, i, inverter.vdc)),
             sign: inverter.sign,
-            residual: inverter.residual,
-            on_resistance: inverter.on_resistance,
+            residual: inverter.settings.residual_v,
+            on_resistance: inverter.settings.on_resistance,
         }
     }
 }

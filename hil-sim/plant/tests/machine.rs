@@ -20,6 +20,11 @@ fn motor(saliency: &SaliencySettings, mechanics: &MechanicsSettings) -> MotorMod
     )
 }
 
+/// Rotor current, A, referred to the stator: `(psi - Lm i)/Lr`.
+fn rotor_current(x: &MachineState) -> Complex {
+    (x.psi - x.i * M.lm) / LS
+}
+
 /// Eq. 2.9 in stator and rotor currents, all in the stator frame, as real matrices. Returns the exact step over `h`
 /// seconds at constant voltage, by the matrix exponential.
 fn exact_step(w: f64, h: f64) -> (Matrix4<f64>, Matrix4x2<f64>) {
@@ -115,7 +120,7 @@ fn without_saliency_the_derivative_is_that_of_the_textbook() {
         let (x, v, w) = random_state(&mut rng);
         let rate = machine.derivative(&x, v, w);
         // Back through Eq. 2.9: flux linkages and rotor current from the state and its derivative.
-        let (i_r, rate_r) = (machine.rotor_current(&x), (rate.psi - rate.i * M.lm) / LS);
+        let (i_r, rate_r) = (rotor_current(&x), (rate.psi - rate.i * M.lm) / LS);
         let stator = x.i * M.rs + rate.i * LS + rate_r * M.lm;
         let rotor = i_r * M.rr + rate.psi - j * w * x.psi;
         assert!((stator - v).norm() < 1e-10, "stator equation: {stator} for {v}");
@@ -133,7 +138,7 @@ fn power_balances_at_every_instant() {
     for _ in 0..1000 {
         let (x, v, w) = random_state(&mut rng);
         let rate = machine.derivative(&x, v, w);
-        let i_r = machine.rotor_current(&x);
+        let i_r = rotor_current(&x);
         let rate_r = (rate.psi - rate.i * M.lm) / LS;
         let stator_flux_rate = rate.i * LS + rate_r * M.lm;
         let input = real(x.i, v);
@@ -153,7 +158,7 @@ fn energy_balances_over_a_start() {
     let mut motor = motor(&SaliencySettings::NONE, &shaft);
     let power = |motor: &MotorModel, v: Complex| {
         let x = &motor.state.electrical;
-        let (i, i_r) = (x.i, motor.machine.rotor_current(x));
+        let (i, i_r) = (x.i, rotor_current(x));
         1.5 * ((i.conj() * v).re - M.rs * i.norm_sqr() - M.rr * i_r.norm_sqr())
     };
     let h = PERIOD / 50.0;
@@ -167,7 +172,7 @@ fn energy_balances_over_a_start() {
         }
     }
     let x = &motor.state.electrical;
-    let i_r = motor.machine.rotor_current(x);
+    let i_r = rotor_current(x);
     let stator_flux = x.i * LS + i_r * M.lm;
     let stored = 0.75 * ((x.i.conj() * stator_flux).re + (i_r.conj() * x.psi).re);
     let kinetic = 0.5 * shaft.inertia * motor.state.speed.powi(2);

@@ -4,7 +4,10 @@ use std::f64::consts::TAU;
 
 use crate::bridge::{PERIOD, plant, settings, voltage};
 use drive_core::Compare;
-use motor_plant::{Complex, InverterSettings, Load, Plant, clarke, phases};
+use motor_plant::{
+    Complex, InverterSettings, Load, Machine, MachineSettings, MachineState, Mechanics,
+    MechanicsSettings, MotorModel, Plant, SaliencySettings, clarke, phases,
+};
 
 /// Returns a motor at a held speed after 0.3 s of a voltage of `volts` that rotates synchronously from `start`, and the
 /// angle by which both rotate in a period, rad.
@@ -100,7 +103,12 @@ fn with_the_outputs_off_a_high_emf_charges_the_link_and_a_low_one_does_not() {
 /// Largest difference of the currents, A, over these periods with the outputs off, from a bridge whose diodes are not
 /// ideal: its legs go from rail to rail between -1 mA and 1 mA.
 fn worst_against_soft_diodes(plant: &mut Plant, periods: u32) -> f64 {
-    let mut reference = *plant.model_a().expect("model A");
+    let load = Load::Speed { speed: plant.mechanical_speed() };
+    let shaft = Mechanics::new(&MechanicsSettings { load, ..Default::default() }).expect("shaft");
+    let machine = Machine::new(&MachineSettings::DEFAULT, &SaliencySettings::DEFAULT);
+    let mut reference = MotorModel::new(machine.expect("machine"), shaft);
+    let (i, psi) = (plant.current(), plant.rotor_flux());
+    reference.state.electrical = MachineState { i, psi, ..Default::default() };
     let vdc = plant.dc_link();
     let mut worst = 0f64;
     for _ in 0..periods {

@@ -66,7 +66,7 @@ impl EnergyMachine {
     /// Makes the machine with these settings.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`].
+    /// [`PlantError`].
     pub fn new(m: &MachineSettings, iron: &IronSettings) -> Result<Self, PlantError> {
         m.check()?;
         iron.check_in(m)?;

@@ -116,7 +116,7 @@ impl Sensors {
     /// Makes the sensors with these settings, at zero current.
     ///
     /// # Errors
-    /// [`PlantError::OutOfRange`].
+    /// [`PlantError`].
     pub fn new(s: &MeasurementSettings) -> Result<Self, PlantError> {
         s.check()?;
         let [a, b] = s.calibration();
