@@ -84,7 +84,7 @@ pub static EXPERIMENTS: LazyLock<Vec<Experiment>> = LazyLock::new(|| Vec::from([
 ].map(described)));
 
 /// The experiments that report printed values of the sources.
-pub static SOURCES: LazyLock<&[&str]> = LazyLock::new(|| &FILE.sources);
+pub static SOURCES: LazyLock<&[String]> = LazyLock::new(|| &FILE.sources);
 
 /// The experiments that need an input file; they are not part of the report.
 pub static WITH_INPUT: LazyLock<[Experiment; 2]> = LazyLock::new(|| {
@@ -100,52 +100,48 @@ pub static TRACE: LazyLock<Experiment> = LazyLock::new(|| {
 });
 
 /// The experiments that a user of a drive needs, in the order of `list`; `list --lab` shows the others.
-pub static EVERYDAY: LazyLock<&[&str]> = LazyLock::new(|| &FILE.everyday);
+pub static EVERYDAY: LazyLock<&[String]> = LazyLock::new(|| &FILE.everyday);
 
 /// The file `experiments.toml`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File<'a> {
+struct File {
     /// See [`EVERYDAY`] and [`SOURCES`].
-    #[serde(borrow)]
-    everyday: Vec<&'a str>,
-    #[serde(borrow)]
-    sources: Vec<&'a str>,
+    everyday: Vec<String>,
+    sources: Vec<String>,
     /// Removed experiments, and their replacements.
-    #[serde(borrow)]
-    replaced: BTreeMap<&'a str, &'a str>,
+    replaced: BTreeMap<String, String>,
     /// Keys of a group by its name.
-    #[serde(borrow)]
-    groups: BTreeMap<&'a str, Vec<&'a str>>,
-    #[serde(borrow)]
-    experiment: BTreeMap<&'a str, Description<'a>>,
+    groups: BTreeMap<String, Vec<String>>,
+    experiment: BTreeMap<String, Description>,
 }
 
 /// An experiment in the file; see the fields of [`Experiment`].
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Description<'a> {
+struct Description {
     #[serde(default)]
-    stands_for: &'a str,
-    about: &'a str,
-    #[serde(borrow, default)]
-    uses: Vec<&'a str>,
-    #[serde(borrow, default)]
-    not: Vec<&'a str>,
+    stands_for: String,
+    about: String,
+    #[serde(default)]
+    uses: Vec<String>,
+    #[serde(default)]
+    not: Vec<String>,
     #[serde(default)]
     remarks: Vec<String>,
 }
 
-static FILE: LazyLock<File<'static>> = LazyLock::new(|| {
+static FILE: LazyLock<File> = LazyLock::new(|| {
     let file = toml::from_str(include_str!("experiments.toml"));
     file.expect("experiments.toml is part of the program")
 });
 
 /// Adds the description of an experiment in `experiments.toml`.
 fn described(experiment: Experiment) -> Experiment {
-    let keys = |names: &[&'static str]| {
-        let of = |name: &&'static str| FILE.groups.get(name).cloned().unwrap_or(vec![*name]);
-        names.iter().flat_map(of).collect()
+    let keys = |names: &'static [String]| {
+        let own = std::slice::from_ref;
+        let of = |name: &'static String| FILE.groups.get(name).map_or(own(name), Vec::as_slice);
+        names.iter().flat_map(of).map(String::as_str).collect()
     };
     let Description { stands_for, about, uses, not, remarks } = &FILE.experiment[experiment.name];
     Experiment { stands_for, about, uses: keys(uses), not: keys(not), remarks, ..experiment }

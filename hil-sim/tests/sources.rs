@@ -14,7 +14,7 @@ use crate::generated;
 /// All experiments that report printed values, with the default settings and seed 1.
 static EVIDENCE: LazyLock<Evidence> = LazyLock::new(|| {
     let mut evidence = Evidence::default();
-    for name in *SOURCES {
+    for name in SOURCES.iter() {
         evidence.add(name, &experiments::run(name, &Config::default(), 1).expect(name));
     }
     evidence

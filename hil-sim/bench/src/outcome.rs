@@ -87,11 +87,6 @@ impl Metrics {
             (Some(lost), None) => (if lost == 0.0 { "no" } else { "yes" }).to_owned(),
         }
     }
-
-    /// Whether there are no numbers.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
 }
 
 fn is_flag(name: &str) -> bool {

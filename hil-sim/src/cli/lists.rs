@@ -14,7 +14,7 @@ use crate::prelude::*;
 pub fn experiments(as_json: bool, lab: bool) -> Result<String, Error> {
     let all = EXPERIMENTS.iter().chain(&*WITH_INPUT);
     if as_json {
-        let object = |e: &Experiment| json!({ "name": e.name, "stands_for": e.stands_for, "about": e.about, "everyday": EVERYDAY.contains(&e.name), "uses": e.uses, "not": e.not });
+        let object = |e: &Experiment| json!({ "name": e.name, "stands_for": e.stands_for, "about": e.about, "everyday": EVERYDAY.iter().any(|name| name == e.name), "uses": e.uses, "not": e.not });
         return pretty(&all.map(object).collect());
     }
     let place = |e: &&Experiment| EVERYDAY.iter().position(|name| *name == e.name);

@@ -50,7 +50,8 @@ pub enum Of {
 /// # Errors
 /// As [`Input::config`] and [`used::check`]; [`Error::Write`]; [`Error::Incomplete`] after the page has been written.
 pub fn report(of: Of, input: &Input, out: &Path) -> Result<(), Error> {
-    let is_chosen = |one: &&Experiment| of == Of::All || experiments::SOURCES.contains(&one.name);
+    let is_source = |one: &Experiment| experiments::SOURCES.iter().any(|name| name == one.name);
+    let is_chosen = |one: &&Experiment| of == Of::All || is_source(one);
     report_of(&EXPERIMENTS.iter().filter(is_chosen).collect::<Vec<_>>(), of, input, out)
 }
 

@@ -11,18 +11,14 @@ pub use file::{Metric, Statistic};
 pub use quantity::{QUANTITIES, Seen};
 pub use record::Record;
 
+use include_dir::{Dir, include_dir};
+
 use self::file::Text;
 use super::course::Ramp;
 use crate::prelude::*;
 
-/// The scenarios of the program by the names of their experiments.
-static SHIPPED: [(&str, &str); 5] = [
-    ("torque-steps", include_str!("../../scenarios/torque-steps.toml")),
-    ("torque-ramp", include_str!("../../scenarios/torque-ramp.toml")),
-    ("torque-reversal", include_str!("../../scenarios/torque-reversal.toml")),
-    ("speed-profile", include_str!("../../scenarios/speed-profile.toml")),
-    ("position-step", include_str!("../../scenarios/position-step.toml")),
-];
+/// The scenarios of the program; the file of an experiment has its name.
+static SHIPPED: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/scenarios");
 
 /// Runs the scenario of the program with this name.
 ///
@@ -133,7 +129,8 @@ pub struct Scenario {
 impl Scenario {
     fn shipped(name: &str, config: &Config) -> Result<Self, Error> {
         let missing = || Error::Internal(format!("scenarios/{name}.toml is missing"));
-        let (_, text) = SHIPPED.iter().find(|(known, _)| *known == name).ok_or_else(missing)?;
+        let file = SHIPPED.get_file(format!("{name}.toml"));
+        let text = file.and_then(|file| file.contents_utf8()).ok_or_else(missing)?;
         Self::of_toml(Path::new(name), text, config)
     }
 

@@ -40,7 +40,7 @@ pub fn page(title: &str, origin: &Origin, sections: &[Section<'_>]) -> Result<St
         [one] => format!("{} – {title}", escape(one.name)),
         _ => title.clone(),
     };
-    let (style, plots) = (include_str!("page.css"), plot::style());
+    let (style, plots) = (include_str!("page.css"), plot::STYLE);
     let (version, seed) = (env!("CARGO_PKG_VERSION"), origin.seed);
     let date = chrono::Utc::now().format("%Y-%m-%d %H:%M");
     let settings = settings(&origin.settings);
@@ -155,11 +155,11 @@ fn write_section(body: &mut String, section: &Section<'_>, folded: bool) -> Resu
 
 /// Writes names in words, and values.
 fn write_metrics(body: &mut String, metrics: &Metrics) {
-    if metrics.is_empty() {
+    let all = metrics.iter().count();
+    if all == 0 {
         return;
     }
     body.push_str("<dl class=\"metrics\">\n");
-    let all = metrics.iter().count();
     for (number, (name, value)) in metrics.iter().enumerate() {
         if number == FIRST_METRICS {
             let more = format!("{} more numbers", all - number);

@@ -15,7 +15,7 @@ use super::prose::{escape, signs};
 use crate::error::Error;
 use crate::outcome::{Figure, Panel, Series, Style};
 use above::{Entry, Label, draw_labels, draw_legend, labels, labels_height, legend, legend_height};
-pub use colours::style;
+pub use colours::STYLE;
 use colours::{GREY, GRID, INK, MARKER, dash, pen, pen_of};
 
 /// Drawing units per pixel of the page. plotters draws in whole units, so finer ones keep curves smooth.
@@ -51,7 +51,7 @@ pub fn svg(figure: &Figure) -> Result<String, Error> {
         text.push_str(&format!("<g transform=\"translate(0 {height})\">\n{}</g>\n", part.text));
         height += part.height;
     }
-    let style = format!("<style>\n{}</style>\n", style());
+    let style = format!("<style>\n{STYLE}</style>\n");
     Ok(Part { text: style + &text, height, width }.element("plot"))
 }
 
@@ -396,7 +396,7 @@ mod tests {
         let curve = svg.find("stroke=\"#0072B2\" stroke-width").unwrap();
         assert!(svg.rfind("stroke=\"#333333\"").unwrap() > curve);
         for part in svg.split("=\"#").skip(1).filter(|part| part.is_char_boundary(6)) {
-            assert!(style().contains(&format!("stroke=\"#{}\"", &part[..6])), "{}", &part[..6]);
+            assert!(STYLE.contains(&format!("stroke=\"#{}\"", &part[..6])), "{}", &part[..6]);
         }
     }
 }

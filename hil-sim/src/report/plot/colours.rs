@@ -15,25 +15,8 @@ pub const INK: RGBColor = RGBColor(51, 51, 51);
 pub const GREY: RGBColor = RGBColor(120, 120, 120);
 pub const GRID: RGBColor = RGBColor(230, 230, 230);
 
-/// The colours that replace palette, ink, grey and grid in dark mode.
-const DARK: [&str; 10] = [
-    "#3d9be0", "#ff7f32", "#2fc79a", "#e39bc4", "#ffbf3f", "#a6dcff", "#ffffff", "#e6e6e6",
-    "#9a9fa6", "#33373d",
-];
-
-/// Returns the style sheet of a figure: in dark mode it replaces the colours, which are attributes.
-pub fn style() -> String {
-    let light = PALETTE.into_iter().chain([INK, GREY, GRID]);
-    let rules = light.zip(DARK).map(|(RGBColor(r, g, b), dark)| {
-        let light = format!("#{r:02X}{g:02X}{b:02X}");
-        format!("[stroke=\"{light}\"]{{stroke:{dark}}} [fill=\"{light}\"]{{fill:{dark}}}\n")
-    });
-    format!(
-        ".plot{{background:#fff}}\n@media screen and (prefers-color-scheme:dark){{\n\
-         .plot{{background:#16181c}}\n{}}}\n",
-        rules.collect::<String>()
-    )
-}
+/// Style sheet of a figure: in dark mode it replaces the colours above, which are attributes of the drawing.
+pub const STYLE: &str = include_str!("../plot.css");
 
 pub fn pen(colour: RGBColor, width: i32) -> ShapeStyle {
     colour.stroke_width(width as u32)
