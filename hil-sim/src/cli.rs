@@ -12,14 +12,8 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
-use crate::board;
-use crate::coefficients;
-use crate::config;
-use crate::console;
-use crate::experiments;
-use crate::first_light;
-use crate::passport;
 use crate::prelude::*;
+use crate::{board, coefficients, config, console, experiments, first_light, passport};
 pub use run::json;
 use run::{Output, Request, Trace};
 

@@ -1,7 +1,5 @@
 //! `cargo sim coefficients`: designs the coefficients of a drive for the image without a design, and writes them beside that image.
 
-use std::fs;
-
 use induction_drive::boards::{self, Board};
 use induction_drive::coefficients::{ADDRESS, Designed, LONGEST};
 use induction_drive::console::restore::Restore;
@@ -47,10 +45,7 @@ pub fn run(options: &Options) -> Result<String, Error> {
     let designed = Designed::new(&settings, options.speed).map_err(|why| refused(&why))?;
     let mut place = [0; LONGEST];
     let file = designed.write(&mut place).ok_or_else(|| refused(&"the coefficients do not fit"))?;
-    if let Some(folder) = options.out.parent() {
-        fs::create_dir_all(folder).map_err(Error::write(folder))?;
-    }
-    fs::write(&options.out, file).map_err(Error::write(&options.out))?;
+    report::write_whole(&options.out, file)?;
     let (out, bytes, board) = (options.out.display(), file.len(), settings.board.name);
     Ok(format!(
         "{out}: {bytes} bytes for the board {board}\n\n\

@@ -209,17 +209,15 @@ pub fn of_trace(outcome: &Outcome, config: &Config, file: &Path) -> Passport {
     let of = |name| outcome.metrics.get(name).unwrap_or(f64::NAN);
     let (l_s, tau_r) = (1e-3 * of("l_s_mh"), of("tau_r_s"));
     let l_m = (l_s * (l_s - 1e-3 * of("sigma_l_s_mh"))).sqrt();
-    let mut twin = toml::Table::new();
-    for (name, value) in [
+    let found = [
         ("motor.r_s", of("r_s_ohm")),
         ("motor.r_r", l_s / tau_r),
         ("motor.l_ls", l_s - l_m),
         ("motor.l_lr", l_s - l_m),
         ("motor.l_m", l_m),
         ("inverter.residual_v", of("drop_v")),
-    ] {
-        twin.insert(name.to_owned(), value.into());
-    }
+    ];
+    let mut twin = toml::Table::from_iter(found.map(|(name, value)| (name.into(), value.into())));
     for key in Key::all().filter(|key| NEEDED.split(' ').any(|name| name == key.name())) {
         if let Number(value) = key.get(config) {
             twin.entry(key.name()).or_insert(value.into());

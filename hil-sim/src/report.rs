@@ -25,7 +25,7 @@ pub use plot::svg;
 ///
 /// # Errors
 /// [`Error::Write`] with the path that could not be written.
-pub fn write_whole(path: &Path, contents: &str) -> Result<(), Error> {
+pub fn write_whole(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Error> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -34,7 +34,7 @@ pub fn write_whole(path: &Path, contents: &str) -> Result<(), Error> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let beside = folder.join(format!(".{name}.{}.part", std::process::id()));
     let written = std::fs::File::create(&beside)
-        .and_then(|mut file| file.write_all(contents.as_bytes()).and_then(|()| file.sync_all()))
+        .and_then(|mut file| file.write_all(contents.as_ref()).and_then(|()| file.sync_all()))
         .and_then(|()| std::fs::rename(&beside, path));
     written.map_err(|e| {
         // The unfinished file is removed; it need not exist.

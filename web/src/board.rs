@@ -6,12 +6,10 @@ use std::collections::VecDeque;
 
 use drive_core::{Line, State};
 use drive_settings::SettingsError;
-use induction_drive::board;
 use induction_drive::console::handle::Port;
 use induction_drive::front::Front;
-use induction_drive::modbus;
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::terminals;
+use induction_drive::{board, modbus, terminals};
 use motor_plant::{
     InverterSettings, Load, MeasurementSettings, MechanicsSettings, Plant, PlantSettings,
 };

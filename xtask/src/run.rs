@@ -157,14 +157,12 @@ impl Steps {
         began: Instant,
         ended: Option<Result<T>>,
     ) -> Option<T> {
-        let (time, how) = (
-            began.elapsed(),
-            match &ended {
-                Some(Ok(_)) => "ok",
-                Some(Err(_)) => "FAILED",
-                None => "not run",
-            },
-        );
+        let time = began.elapsed();
+        let how = match &ended {
+            Some(Ok(_)) => "ok",
+            Some(Err(_)) => "FAILED",
+            None => "not run",
+        };
         println!("===== {name}: {how} after {:.0} s", time.as_secs_f64());
         let (passed, ended) = match ended {
             Some(Ok(passed)) => (Some(passed), Some(Ok(()))),

@@ -98,18 +98,17 @@ fn some<S: Study>(context: &Context<'_>, numbers: &[usize], keep: Keep<'_>) -> R
 fn value<S: Study>(number: usize, record: &S::Record) -> Result<Value, Error> {
     let lost = |e| Error::Internal(format!("the record of run {number} is not kept exactly: {e}"));
     let value = serde_json::to_value(record).map_err(lost)?;
-    let again = read::<S>(value.clone()).and_then(serde_json::to_value).map_err(lost)?;
+    let again = serde_json::from_value::<S::Record>(value.clone())
+        .and_then(serde_json::to_value)
+        .map_err(lost)?;
     let changes = || Error::Internal(format!("the record of run {number} changes: {again}"));
     if again == value { Ok(value) } else { Err(changes()) }
 }
 
-fn read<S: Study>(value: Value) -> serde_json::Result<S::Record> {
-    serde_json::from_value(value)
-}
-
 fn outcome<S: Study>(context: &Context<'_>, values: Vec<Value>) -> Result<Outcome, Error> {
     let record = |(number, value)| {
-        read::<S>(value).map_err(|e| Error::Refused(format!("the record of run {number}: {e}")))
+        serde_json::from_value(value)
+            .map_err(|e| Error::Refused(format!("the record of run {number}: {e}")))
     };
     let records = values.into_iter().enumerate().map(record).collect::<Result<_, _>>()?;
     S::new(context)?.outcome(context, records)

@@ -267,9 +267,8 @@ impl Study for Commission {
             "shaft (°)" => Cell::fixed(r.shaft_deg, 3);
             "result" => Cell::from(r.result());
         ]);
-        let (title, listed) =
-            ("Sessions, the worst first; errors in %", by_error.into_iter().take(LISTED));
-        outcome.tables.push(Table::of(title, &columns, listed));
+        let (title, listed) = ("Sessions, the worst first; errors in %", by_error.into_iter());
+        outcome.tables.push(Table::of(title, &columns, listed.take(LISTED)));
         if let (None, [record]) = (self.machines, records.as_slice()) {
             outcome.tables = vec![session_table(record), self.found_table(record)];
         }

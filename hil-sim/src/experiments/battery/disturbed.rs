@@ -53,29 +53,30 @@ pub enum Asymmetry {
     StatorFixed(i16),
 }
 
+/// Name of a difference, its size in thousandths, and the value of the bench that it changes.
+type Change = (&'static str, i16, fn(&mut Config) -> &mut f64);
+
 impl Asymmetry {
     /// Describes the difference in words.
     pub fn name(self) -> String {
-        let percent = |thousandths: i16| f64::from(thousandths) / 10.0;
-        match self {
-            Self::None => "nothing changed".to_owned(),
-            Self::GainA(by) => format!("gain a {:+} %", percent(by)),
-            Self::GainB(by) => format!("gain b {:+} %", percent(by)),
-            Self::CrossTalk(by) => format!("cross-talk {:+} %", percent(by)),
-            Self::StatorFixed(by) => format!("stator-fixed {:+} %", percent(by)),
-        }
+        let text = |(name, by, _)| format!("{name} {:+} %", f64::from(by) / 10.0);
+        self.change().map_or("nothing changed".to_owned(), text)
     }
 
     /// Adds the difference to the bench.
     pub fn add(self, config: &mut Config) {
-        let share = |thousandths: i16| f64::from(thousandths) / 1e3;
-        let sensors = &mut config.measurement;
+        if let Some((_, by, value)) = self.change() {
+            *value(config) += f64::from(by) / 1e3;
+        }
+    }
+
+    fn change(self) -> Option<Change> {
         match self {
-            Self::None => {}
-            Self::GainA(by) => sensors.gain_error_a += share(by),
-            Self::GainB(by) => sensors.gain_error_b += share(by),
-            Self::CrossTalk(by) => sensors.cross_talk_a += share(by),
-            Self::StatorFixed(by) => config.iron.stator_fixed += share(by),
+            Self::None => None,
+            Self::GainA(by) => Some(("gain a", by, |c| &mut c.measurement.gain_error_a)),
+            Self::GainB(by) => Some(("gain b", by, |c| &mut c.measurement.gain_error_b)),
+            Self::CrossTalk(by) => Some(("cross-talk", by, |c| &mut c.measurement.cross_talk_a)),
+            Self::StatorFixed(by) => Some(("stator-fixed", by, |c| &mut c.iron.stator_fixed)),
         }
     }
 }
