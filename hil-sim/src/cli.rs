@@ -144,7 +144,7 @@ pub fn main() -> ExitCode {
         }
         Some(Command::List { lab, json }) => lists::experiments(json, lab).and_then(say),
         Some(Command::Motors { plate: Some(plate), .. }) => {
-            config::plate::motor_file(&plate).and_then(say)
+            config::motors::motor_file(&plate).and_then(say)
         }
         Some(Command::Motors { name, json, .. }) => {
             lists::motors(name.as_deref(), json).and_then(say)

@@ -6,8 +6,6 @@ use clap::Args;
 use sim_bench::prelude::*;
 
 use crate::config::Value;
-use crate::config::motors::Motor;
-use crate::config::plate::ESTIMATED;
 
 /// The options that describe a simulation.
 #[derive(Args, Clone, Default)]
@@ -54,16 +52,6 @@ impl Input {
             config.set("seconds", &Value::Number(seconds))?;
         }
         Ok(config)
-    }
-
-    /// Returns what a reader of the results has to know of the motor.
-    ///
-    /// # Errors
-    /// As [`Motor::find`].
-    pub fn remark(&self) -> Result<Option<String>, Error> {
-        let motor = self.motor.as_deref().map(Motor::find).transpose()?;
-        let estimated = motor.filter(Motor::is_estimated);
-        Ok(estimated.map(|motor| format!("{}: circuit and dc link are {ESTIMATED}.", motor.name)))
     }
 
     /// Returns progress bars, unless they are switched off.

@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::cli_common::{folder, hil_sim, object, text};
 use drive_settings::PlantSource;
 use hil_sim::Config;
-use hil_sim::config::{motors::Motor, plate};
+use hil_sim::config::{motors, motors::Motor, plate};
 
 const LARGE: &str = include_str!("own-motor/large.toml");
 
@@ -144,7 +144,7 @@ fn a_file_with_the_nameplate_alone_is_completed() {
     let folder = folder("own-motor-plate");
     let alone = LARGE.split("[motor]").next().expect("the nameplate");
     let file = written(&folder, "alone.toml", alone);
-    let made = plate::motor_file("1,5 kW, 400 V, 3.4 A, 50 Hz, 1435 rpm").unwrap();
+    let made = motors::motor_file("1,5 kW, 400 V, 3.4 A, 50 Hz, 1435 rpm").unwrap();
     let made = Config::of_motor(Some(&written(&folder, "made.toml", &made))).unwrap();
     assert_eq!(Config::of_motor(Some(&file)).unwrap(), made);
     // The circuit draws the rated current and gives the rated power at the rated speed.

@@ -70,7 +70,7 @@ fn run<'py>(
 /// Circuit and dc link are estimated, and marked as such.
 #[pyfunction]
 fn motor_file(nameplate: &str) -> PyResult<String> {
-    hil_sim::config::plate::motor_file(nameplate).map_err(raised)
+    hil_sim::config::motors::motor_file(nameplate).map_err(raised)
 }
 
 /// Commissions the motor of a configuration at rest, with a drive that knows its nameplate, and returns the results and the settings that

@@ -72,7 +72,7 @@ use num_complex::Complex32;
 
 pub use collector::{BINS, Bin, Collector, Record};
 pub use found::{Found, Leakage, Levels};
-pub use plate::{check_motor, contradiction};
+pub use plate::{check_motor, check_nameplate};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
 use fit::{Fitted, Search};

@@ -94,7 +94,10 @@ impl Plate {
             pulse_v: settings.share_of_dc_link(60.0),
             dead_time: settings.inverter.dead_time_s / settings.inverter.carrier_s(),
             dc_link: settings.inverter.dc_link_v,
-            implausible: power_and_speed(plate).into_iter().chain([current]).find(is_implausible),
+            implausible: power_and_speed(plate)
+                .into_iter()
+                .chain([current])
+                .find(|entry| !entry.is_allowed()),
         }
     }
 
@@ -111,7 +114,7 @@ impl Plate {
 /// Returns power and speed of a nameplate, each with the range that the other entries allow.
 fn power_and_speed(plate: &Nameplate) -> [Quantity; 2] {
     let apparent = SQRT_3 * plate.voltage_v * plate.current_a;
-    let synchronous = plate.synchronous_rpm();
+    let synchronous = plate.speed_rpm / (1.0 - plate.slip());
     let power = (POWER.0 * apparent, POWER.1 * apparent);
     let speed = ((1.0 - SLIP.1) * synchronous, (1.0 - SLIP.0) * synchronous);
     [
@@ -120,13 +123,13 @@ fn power_and_speed(plate: &Nameplate) -> [Quantity; 2] {
     ]
 }
 
-fn is_implausible(entry: &Quantity) -> bool {
-    !entry.is_allowed()
-}
-
-/// Returns why power or speed of a nameplate does not fit its other entries.
-pub fn contradiction(plate: &Nameplate) -> Option<Refusal> {
-    power_and_speed(plate).into_iter().find(is_implausible).map(Refusal::Plate)
+/// Checks that power and speed of a nameplate fit its other entries.
+///
+/// # Errors
+/// [`Refusal::Plate`].
+pub fn check_nameplate(plate: &Nameplate) -> Result<(), Refusal> {
+    let implausible = power_and_speed(plate).into_iter().find(|entry| !entry.is_allowed());
+    implausible.map_or(Ok(()), |entry| Err(Refusal::Plate(entry)))
 }
 
 /// Checks that the motor of these settings can have their nameplate, as the steps of the commissioning check what they find.

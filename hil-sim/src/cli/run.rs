@@ -4,6 +4,7 @@ use trace::Voltages;
 
 use super::part::Part;
 use super::{say, used};
+use crate::config::motors::Motor;
 use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, TRACE, identify_trace as trace, scenario};
 use crate::outcome::{self, Origin};
@@ -181,7 +182,8 @@ fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
     for experiment in chosen {
         let context = Context { file, ..Context::new(&config, input.seed, input.progress()) };
         let Some(mut outcome) = part.run(experiment, &context, input.quiet)? else { continue };
-        outcome.remarks.extend(input.remark()?);
+        let motor = input.motor.as_deref().map(Motor::find).transpose()?;
+        outcome.remarks.extend(motor.and_then(|motor| motor.remark()));
         let command = match file {
             Some(_) if own.is_some() => format!("run {name}"),
             Some(file) => format!("run {} --input {}", experiment.name, file.display()),

@@ -173,14 +173,9 @@ impl Nameplate {
         (60.0 * self.frequency_hz / self.speed_rpm + 0.02).max(1.0) as u8
     }
 
-    /// Returns the synchronous speed, rpm.
-    pub fn synchronous_rpm(&self) -> f32 {
-        60.0 * self.frequency_hz / f32::from(self.pole_pairs())
-    }
-
     /// Returns the slip at rated speed.
     pub fn slip(&self) -> f32 {
-        1.0 - self.speed_rpm / self.synchronous_rpm()
+        1.0 - self.speed_rpm * f32::from(self.pole_pairs()) / (60.0 * self.frequency_hz)
     }
 }
 

@@ -21,6 +21,16 @@ static FILES: Dir<'static> = include_dir!("$MOTORS");
 pub const NEEDED: &str = "nameplate.power_w nameplate.voltage_v nameplate.current_a nameplate.frequency_hz nameplate.speed_rpm \
     motor.r_s motor.r_r motor.l_ls motor.l_lr motor.l_m motor.pole_pairs inverter.dc_link_v";
 
+/// Units of a nameplate, with the keys of the group `nameplate` and the factors.
+const UNITS: [(&str, &str, f64); 6] = [
+    ("W", "power_w", 1.0),
+    ("kW", "power_w", 1e3),
+    ("V", "voltage_v", 1.0),
+    ("A", "current_a", 1.0),
+    ("Hz", "frequency_hz", 1.0),
+    ("rpm", "speed_rpm", 1.0),
+];
+
 /// Returns the text of a file of `motors/measured`: values that others have measured on a motor.
 ///
 /// # Errors
@@ -120,9 +130,11 @@ impl Motor {
         Ok(self)
     }
 
-    /// Whether circuit and dc link are estimated from the nameplate.
-    pub fn is_estimated(&self) -> bool {
-        self.source.iter().any(|source| source.from == plate::ESTIMATED)
+    /// Returns what a reader of the results has to know: that circuit and dc link are estimated.
+    pub fn remark(&self) -> Option<String> {
+        let is_estimated = self.source.iter().any(|source| source.from == plate::ESTIMATED);
+        is_estimated
+            .then(|| format!("{}: circuit and dc link are {}.", self.name, plate::ESTIMATED))
     }
 
     /// Returns the keys that the file sets, with their values.
@@ -213,6 +225,41 @@ impl Motor {
             .map(|key| format!("set {} {}", key.name(), key.get(&config)))
             .collect()
     }
+}
+
+/// Returns the motor file of a nameplate such as `750 W, 400 V, 1.86 A, 50 Hz, 1400 rpm`. A source marks the numbers that are estimated.
+///
+/// # Errors
+/// [`Error::Refused`] with the part that is no number with one of the units, that is missing, or that occurs twice; as [`plate::circuit`].
+pub fn motor_file(text: &str) -> Result<String, Error> {
+    let refused = |why: String| {
+        let example = "for example: 750 W, 400 V, 1.86 A, 50 Hz, 1400 rpm";
+        Err(Error::Refused(format!("nameplate: {why}; {example}")))
+    };
+    let mut file = format!("title = {text:?}\n[nameplate]\n");
+    let mut missing = UNITS.map(|(_, key, _)| key).to_vec();
+    for part in text.split(", ").map(str::trim) {
+        let end = part.find(|c: char| !c.is_ascii_digit() && !".,".contains(c));
+        let (number, unit) = part.split_at(end.unwrap_or(part.len()));
+        let number = number.replace(',', ".").parse::<f64>();
+        let known = UNITS.iter().find(|(name, ..)| name.eq_ignore_ascii_case(unit.trim()));
+        let (Ok(number), Some((_, key, factor))) = (number, known) else {
+            return refused(format!("{:?} is no number in W, kW, V, A, Hz or rpm", cut(part)));
+        };
+        if !missing.contains(key) {
+            return refused(format!("{:?} is a second {key}", cut(part)));
+        }
+        missing.retain(|other| other != key);
+        file += &format!("{key} = {}\n", number * factor);
+    }
+    if !missing.is_empty() {
+        return refused(format!("{} missing", missing.join(", ")));
+    }
+    let motor = Motor::from_text("nameplate.toml", &file)?;
+    let mut config = Config::default();
+    motor.apply(&mut config)?;
+    config.drive.build().map_err(Error::refused)?;
+    toml::to_string(&motor).map_err(|e| Error::Internal(e.to_string()))
 }
 
 /// Whether a key belongs to the nameplate.

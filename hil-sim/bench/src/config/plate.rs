@@ -11,8 +11,7 @@ use drive_settings::Nameplate;
 use drive_settings::tuning::bisected;
 
 use super::Config;
-use super::motors::Motor;
-use crate::error::{Error, cut};
+use crate::error::Error;
 
 /// Source of an estimated number.
 pub const ESTIMATED: &str = "estimated from the nameplate; `commission` measures it";
@@ -22,61 +21,15 @@ const LEAKAGE: f64 = 0.09;
 const MAGNETISING: (f64, f64) = (0.5, 20.0);
 /// Voltage of the dc link relative to the rated voltage: that of a rectified supply.
 const DC_LINK: f64 = 1.35;
-/// Units of a nameplate, with the keys of the group `nameplate` and the factors.
-const UNITS: [(&str, &str, f64); 6] = [
-    ("W", "power_w", 1.0),
-    ("kW", "power_w", 1e3),
-    ("V", "voltage_v", 1.0),
-    ("A", "current_a", 1.0),
-    ("Hz", "frequency_hz", 1.0),
-    ("rpm", "speed_rpm", 1.0),
-];
-
-/// Returns the motor file of a nameplate such as `750 W, 400 V, 1.86 A, 50 Hz, 1400 rpm`. A source marks the numbers that are estimated.
-///
-/// # Errors
-/// [`Error::Refused`] with the part that is no number with one of the units, that is missing, or that occurs twice; as [`circuit`].
-pub fn motor_file(text: &str) -> Result<String, Error> {
-    let refused = |why: String| {
-        let example = "for example: 750 W, 400 V, 1.86 A, 50 Hz, 1400 rpm";
-        Err(Error::Refused(format!("nameplate: {why}; {example}")))
-    };
-    let mut file = format!("title = {text:?}\n[nameplate]\n");
-    let mut missing = UNITS.map(|(_, key, _)| key).to_vec();
-    for part in text.split(", ").map(str::trim) {
-        let end = part.find(|c: char| !c.is_ascii_digit() && !".,".contains(c));
-        let (number, unit) = part.split_at(end.unwrap_or(part.len()));
-        let number = number.replace(',', ".").parse::<f64>();
-        let known = UNITS.iter().find(|(name, ..)| name.eq_ignore_ascii_case(unit.trim()));
-        let (Ok(number), Some((_, key, factor))) = (number, known) else {
-            return refused(format!("{:?} is no number in W, kW, V, A, Hz or rpm", cut(part)));
-        };
-        if !missing.contains(key) {
-            return refused(format!("{:?} is a second {key}", cut(part)));
-        }
-        missing.retain(|other| other != key);
-        file += &format!("{key} = {}\n", number * factor);
-    }
-    if !missing.is_empty() {
-        return refused(format!("{} missing", missing.join(", ")));
-    }
-    let motor = Motor::from_text("nameplate.toml", &file)?;
-    let mut config = Config::default();
-    motor.apply(&mut config)?;
-    config.drive.build().map_err(Error::refused)?;
-    toml::to_string(&motor).map_err(|e| Error::Internal(e.to_string()))
-}
 
 /// Checks that the entries of the nameplate in force fit each other and the motor.
 ///
 /// # Errors
 /// [`Error::Refused`] with what does not fit, its value, and the range that would.
 pub fn check(config: &Config) -> Result<(), Error> {
-    let (plate, given) = (&config.drive.nameplate, config.motor.pole_pairs);
-    let pairs = plate.pole_pairs();
-    if let Some(refusal) = drive_commission::contradiction(plate) {
-        return Err(Error::refused(refusal));
-    }
+    let plate = &config.drive.nameplate;
+    let (pairs, given) = (plate.pole_pairs(), config.motor.pole_pairs);
+    drive_commission::check_nameplate(plate).map_err(Error::refused)?;
     if given != u32::from(pairs) {
         let why = format!("frequency and speed of the nameplate make {pairs}");
         return Err(Error::Refused(format!("motor.pole_pairs = {given}: {why}")));
@@ -91,9 +44,7 @@ pub fn check(config: &Config) -> Result<(), Error> {
 /// # Errors
 /// [`Error::Refused`] if an entry does not fit the others, or if no circuit draws the current and gives the power at the speed.
 pub fn circuit(plate: &Nameplate) -> Result<[(&'static str, f64); 7], Error> {
-    if let Some(refusal) = drive_commission::contradiction(plate) {
-        return Err(Error::refused(refusal));
-    }
+    drive_commission::check_nameplate(plate).map_err(Error::refused)?;
     let slip = f64::from(plate.slip());
     let [voltage, hertz, power] =
         [plate.voltage_v, plate.frequency_hz, plate.power_w].map(f64::from);
@@ -101,8 +52,7 @@ pub fn circuit(plate: &Nameplate) -> Result<[(&'static str, f64); 7], Error> {
     let rated = |r, x_m| rated([r, r, LEAKAGE, LEAKAGE, x_m]);
     let resistance = |x_m| bisected((1e-3, 1.0), 40, &|r| rated(r, x_m).0 < slip).0;
     let (x_m, _) = bisected(MAGNETISING, 40, &|x_m| rated(resistance(x_m), x_m).1 < power);
-    let r = resistance(x_m);
-    let found = rated(r, x_m);
+    let (r, found) = (resistance(x_m), rated(resistance(x_m), x_m));
     if (found.0 / slip - 1.0).abs().max((found.1 / power - 1.0).abs()) > 0.01 {
         let why = "nameplate: no circuit draws this current and gives this power at this speed";
         return Err(Error::Refused(format!("{why}; compare each number, for your connection")));
