@@ -7,6 +7,7 @@
 //! the leg is at half the dc link. A pulse shorter than the dead time vanishes, as it does in the timer.
 
 use drive_core::Compare;
+use heapless::Vec;
 
 use crate::averaged::SmoothSign;
 use crate::complex::{Complex, clarke, phases};
@@ -15,6 +16,11 @@ use crate::terminals::Source;
 
 /// Current below which a leg with both switches off has no defined level, A.
 const NO_CURRENT: f64 = 1e-9;
+/// Number of edges of one leg that matter in one period: two of this period, two of the previous period, one at the
+/// boundary.
+const EDGES: usize = 5;
+/// Number of times at which anything changes: two per edge and leg, and the end.
+const INSTANTS: usize = 3 * 2 * EDGES + 1;
 
 /// State of a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,29 +34,27 @@ pub(crate) enum Level {
 }
 
 /// Commanded edges of one leg, in order of time: the instant at which the edge takes effect (s from the start of the
-/// period), and whether the leg goes high. Two of this period, two of the previous period and one at the boundary matter.
+/// period), and whether the leg goes high.
 #[derive(Clone, Debug)]
-struct Leg(Vec<(f64, bool)>);
+struct Leg(Vec<(f64, bool), EDGES>);
 
 impl Leg {
     fn new(before: f64, now: f64, period: f64, delay: f64) -> Self {
-        let mut edges = Self::pulse(before, -period, period);
-        if (before >= 1.0) != (now >= 1.0) {
-            edges.push((0.0, now >= 1.0));
-        }
-        edges.extend(Self::pulse(now, 0.0, period));
+        let boundary = ((before >= 1.0) != (now >= 1.0)).then_some((0.0, now >= 1.0));
+        let edges = Self::pulse(before, -period, period).chain(boundary);
+        let edges = edges.chain(Self::pulse(now, 0.0, period));
+        let mut edges: Vec<_, EDGES> = edges.map(|(time, high)| (time + delay, high)).collect();
         if edges.is_empty() {
             // An edge in the distant past.
-            edges.push((f64::NEG_INFINITY, now >= 1.0));
+            edges.extend([(f64::NEG_INFINITY, now >= 1.0)]);
         }
-        edges.iter_mut().for_each(|(time, _)| *time += delay);
         Self(edges)
     }
 
-    fn pulse(duty: f64, start: f64, period: f64) -> Vec<(f64, bool)> {
+    fn pulse(duty: f64, start: f64, period: f64) -> impl Iterator<Item = (f64, bool)> {
         let edge = |share: f64| start + 0.5 * period * share;
-        let switches = duty > 0.0 && duty < 1.0;
-        if switches { vec![(edge(1.0 - duty), true), (edge(1.0 + duty), false)] } else { vec![] }
+        let edges = [(edge(1.0 - duty), true), (edge(1.0 + duty), false)];
+        edges.into_iter().filter(move |_| duty > 0.0 && duty < 1.0)
     }
 
     /// Returns the level at `time`.
@@ -72,7 +76,7 @@ impl Leg {
 #[derive(Clone, Debug)]
 pub(crate) struct Pattern {
     legs: [Leg; 3],
-    instants: Vec<f64>,
+    instants: Vec<f64, INSTANTS>,
     dead_time: f64,
 }
 
@@ -89,7 +93,7 @@ impl Pattern {
         let edges = legs.iter().flat_map(|leg| &leg.0);
         let changes = edges.flat_map(|(edge, _)| [*edge, edge + inverter.dead_time]);
         let inside = changes.filter(|instant| *instant > 0.0 && *instant < period);
-        let mut instants: Vec<f64> = inside.chain([period]).collect();
+        let mut instants: Vec<f64, INSTANTS> = inside.chain([period]).collect();
         instants.sort_unstable_by(f64::total_cmp);
         Self { legs, instants, dead_time: inverter.dead_time }
     }
