@@ -69,11 +69,10 @@ impl Plate {
         let z_b = plate.base_impedance();
         let omega = TAU * plate.frequency_hz;
         let l_b = z_b / omega;
-        let largest_a = safe / (LEAST_CURRENT * SQRT_2);
         // The rotor current is at least the one that carries the power at the rated voltage.
         let largest_r_r = plate.slip() * plate.voltage_v * plate.voltage_v / plate.power_w;
-        let current =
-            Quantity::new("nameplate.current_a", "A", plate.current_a).allowing((0.0, largest_a));
+        let current = Quantity::new("nameplate.current_a", "A", plate.current_a)
+            .allowing((0.0, safe / (LEAST_CURRENT * SQRT_2)));
         Self {
             amperes: rated.min(safe).min(settings.trip_a() / 1.15),
             z_b,
