@@ -236,7 +236,7 @@ pub fn motor_file(text: &str) -> Result<String, Error> {
         let example = "for example: 750 W, 400 V, 1.86 A, 50 Hz, 1400 rpm";
         Err(Error::Refused(format!("nameplate: {why}; {example}")))
     };
-    let mut file = format!("title = {text:?}\n[nameplate]\n");
+    let mut file = format!("title = {}\n[nameplate]\n", toml::Value::from(text));
     let mut missing = UNITS.map(|(_, key, _)| key).to_vec();
     for part in text.split(", ").map(str::trim) {
         let end = part.find(|c: char| !c.is_ascii_digit() && !".,".contains(c));
@@ -244,10 +244,10 @@ pub fn motor_file(text: &str) -> Result<String, Error> {
         let number = number.replace(',', ".").parse::<f64>();
         let known = UNITS.iter().find(|(name, ..)| name.eq_ignore_ascii_case(unit.trim()));
         let (Ok(number), Some((_, key, factor))) = (number, known) else {
-            return refused(format!("{:?} is no number in W, kW, V, A, Hz or rpm", cut(part)));
+            return refused(format!("`{}` is no number in W, kW, V, A, Hz or rpm", cut(part)));
         };
         if !missing.contains(key) {
-            return refused(format!("{:?} is a second {key}", cut(part)));
+            return refused(format!("`{}` is a second {key}", cut(part)));
         }
         missing.retain(|other| other != key);
         file += &format!("{key} = {}\n", number * factor);
