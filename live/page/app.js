@@ -7,7 +7,7 @@ const make = (tag, attributes = {}, ...children) => {
   return element;
 };
 
-// --- connection ----------------------------------------------------------------------------------
+// --- connection ---
 const token = new URLSearchParams(location.search).get('token');
 let socket, number = 0, hello = null, gone = 'connecting', answers = new Map(), listeners = [];
 
@@ -92,7 +92,7 @@ function announced(said) {
 
 const views = [...document.querySelectorAll('main > section')];
 
-// --- head ----------------------------------------------------------------------------------------
+// --- head ---
 // The last set-point of this page, by mode.
 let alarms = {}, present = '', asked = {};
 function alarm(name, lines) {
@@ -174,7 +174,7 @@ async function tell(line, to = say) {
 }
 const quiet = () => {};
 
-// --- frames --------------------------------------------------------------------------------------
+// --- frames ---
 // Legible on white and on black.
 const COLOURS = ['#3b82f6', '#ef4444', '#22a559', '#d97706', '#a855f7', '#0891b2', '#db2777', '#85888c'];
 const SYMBOLS = { a: 'A', v: 'V', hz: 'Hz', deg: '°', nm: 'Nm', c: '°C' };
@@ -292,7 +292,7 @@ function endRecord() {
   $('record').setAttribute('aria-pressed', false);
 }
 
-// --- flux ----------------------------------------------------------------------------------------
+// --- flux ---
 let truth = false;
 /** Draws the drive's angle and the motor's, turns, and the motor's flux, Wb, where they are known. */
 function drawFlux(angle, motor, psi) {
@@ -316,7 +316,7 @@ function drawFlux(angle, motor, psi) {
     : `rotor flux: estimate (thin), motor (thick) ${psi.toFixed(2)} Wb${on && psi > 0.02 ? `, apart ${error.toFixed(1)}°` : ''}`;
 }
 
-// --- controls ------------------------------------------------------------------------------------
+// --- controls ---
 const WHAT = { torque: 'current, A peak', speed: 'speed, rpm', position: 'position, turns', vf: 'speed, rpm' };
 ($('mode').onchange = () => {
   const mode = $('mode').value;

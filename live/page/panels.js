@@ -1,7 +1,7 @@
 'use strict';
 // The views of settings, loops, trace, set-up and console.
 
-// --- views ---------------------------------------------------------------------------------------
+// --- views ---
 function view(id) {
   views.forEach(section => section.classList.toggle('shown', section.id === id));
   document.querySelectorAll('nav button').forEach(tab => tab.setAttribute('aria-selected', tab.dataset.view === id));
@@ -15,7 +15,7 @@ document.querySelector('nav').append(...views.map(section => {
   return tab;
 }));
 
-// --- settings ------------------------------------------------------------------------------------
+// --- settings ---
 let settings = [], compared = new Map();
 const sayOfSettings = (text, bad) => { $('settings-said').textContent = text; $('settings-said').className = bad ? 'error' : ''; };
 async function loadSettings() {
@@ -112,7 +112,7 @@ $('get-learned').onclick = async () => {
   try { $('learned').textContent = (await ask('learned')).join('\n'); } catch (error) { $('learned').textContent = error.message; }
 };
 
-// --- loops ---------------------------------------------------------------------------------------
+// --- loops ---
 const sayOfLoops = (text, bad) => { $('l-said').textContent = text; $('l-said').className = bad ? 'error' : ''; };
 /** The figures that the settings give, staged ones included; or why there are none. */
 function showLoops(loops) {
@@ -147,7 +147,7 @@ function showStep(lines) {
   stepping = null;
 }
 
-// --- trace ---------------------------------------------------------------------------------------
+// --- trace ---
 let tracePlots = [], traceText = '';
 const sayOfTrace = (text, bad) => { $('t-said').textContent = text; $('t-said').className = bad ? 'error' : ''; };
 /** Plots the lines of a trace; what there is to say of it. */
@@ -253,7 +253,7 @@ $('steps').prepend(guide(BOARD));
 $('steps').append(...STEPS.map(guide));
 $('steps').firstChild.append(make('p', { id: 'reading', className: 'hint' }));
 
-// --- a simulated motor ----------------------------------------------------------------------------
+// --- a simulated motor ---
 /** Lines for drive and motor, one after the other. `~off` switches off first, `~STATE` waits for a state. */
 async function play(lines) {
   try {
@@ -285,7 +285,7 @@ $('back').onclick = () => turn(-1);
 $('next').onclick = () => turn(1);
 turn(0);
 
-// --- console -------------------------------------------------------------------------------------
+// --- console ---
 const past = [];
 let at = 0;
 function log(text) {
