@@ -73,6 +73,7 @@ impl Plate {
         let largest_r_r = plate.slip() * plate.voltage_v * plate.voltage_v / plate.power_w;
         let current = Quantity::new("nameplate.current_a", "A", plate.current_a)
             .allowing((0.0, safe / (LEAST_CURRENT * SQRT_2)));
+        let mut entries = power_and_speed(plate).into_iter().chain([current]);
         Self {
             amperes: rated.min(safe).min(settings.trip_a() / 1.15),
             z_b,
@@ -93,10 +94,7 @@ impl Plate {
             pulse_v: settings.share_of_dc_link(60.0),
             dead_time: settings.inverter.dead_time_s / settings.inverter.carrier_s(),
             dc_link: settings.inverter.dc_link_v,
-            implausible: power_and_speed(plate)
-                .into_iter()
-                .chain([current])
-                .find(|entry| !entry.is_allowed()),
+            implausible: entries.find(|entry| !entry.is_allowed()),
         }
     }
 

@@ -52,7 +52,8 @@ pub fn circuit(plate: &Nameplate) -> Result<[(&'static str, f64); 7], Error> {
     let rated = |r, x_m| rated([r, r, LEAKAGE, LEAKAGE, x_m]);
     let resistance = |x_m| bisected((1e-3, 1.0), 40, &|r| rated(r, x_m).0 < slip).0;
     let (x_m, _) = bisected(MAGNETISING, 40, &|x_m| rated(resistance(x_m), x_m).1 < power);
-    let (r, found) = (resistance(x_m), rated(resistance(x_m), x_m));
+    let r = resistance(x_m);
+    let found = rated(r, x_m);
     if (found.0 / slip - 1.0).abs().max((found.1 / power - 1.0).abs()) > 0.01 {
         let why = "nameplate: no circuit draws this current and gives this power at this speed";
         return Err(Error::Refused(format!("{why}; compare each number, for your connection")));
