@@ -138,6 +138,11 @@ pub fn ensure_chromium() -> Result<()> {
     provide("chromium", || answers("chromium"), "", "chromium")
 }
 
+/// Finds or installs `wasm-opt`, which makes a library for a browser smaller.
+pub fn ensure_binaryen() -> Result<()> {
+    provide("wasm-opt", || answers("wasm-opt"), "", "binaryen")
+}
+
 /// Finds or installs the clients of the field bus that are programs of Debian: mbpoll, and LinuxCNC with its `vfdb_vfd`.
 pub fn ensure_bus_clients() -> Result<()> {
     let there = || {
