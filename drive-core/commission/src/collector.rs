@@ -3,7 +3,7 @@
 //! Sample `k` of the current is paired with the mean of the voltages of the steps `k-2` and `k-1`: the voltage of step
 //! `k-1` acts from `k` on, and the voltage of step `k-2` ends at `k`.
 
-use super::motion::Motion;
+use super::motion::{Motion, Ringing};
 use super::plant_fit::PlantFit;
 use drive_core::carrier::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use drive_core::{Abc, AlphaBeta, PERIOD_S};
@@ -42,6 +42,8 @@ pub enum Record {
     },
     /// Q-axis current and speed, by [`push_motion`](Collector::push_motion).
     Motion,
+    /// The speed after an impulse of torque, by [`push_motion`](Collector::push_motion).
+    Ringing,
 }
 
 impl Record {
@@ -101,6 +103,7 @@ pub(super) struct Recorded {
     noise: [f32; 5],
     first_dc_link: f32,
     pub motion: Motion,
+    pub ringing: Ringing,
     pub plant: PlantFit,
 }
 
@@ -133,10 +136,12 @@ impl Collector {
     /// [telemetry](drive_core::Telemetry).
     pub fn push_motion(&mut self, i_q: f32, rotor_freq: f32) {
         let sums = &mut self.recorded;
-        if sums.record == Record::Motion {
-            sums.motion.push(i_q, rotor_freq);
-            sums.samples = sums.samples.wrapping_add(1);
+        match sums.record {
+            Record::Motion => sums.motion.push(i_q, rotor_freq),
+            Record::Ringing => sums.ringing.push(rotor_freq),
+            _ => return,
         }
+        sums.samples = sums.samples.wrapping_add(1);
     }
 
     /// Takes a step of the drive while it applies the test signal: `measured`, `realised` and `dc_link` of its
@@ -144,7 +149,7 @@ impl Collector {
     pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta, dc_link: f32) {
         let ([last, before], sums) = (self.voltages, &mut self.recorded);
         match sums.record {
-            Record::Motion => return,
+            Record::Motion | Record::Ringing => return,
             Record::Nothing => {}
             Record::Bins { half, .. } => {
                 // The last bin goes on until the next record.

@@ -76,6 +76,7 @@ pub use plate::{check_motor, check_nameplate};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
 use fit::{Fitted, Search};
+use inertia::Trial;
 use plate::Plate;
 use report::{SIZE, TIME};
 use staircase::Staircase;
@@ -157,9 +158,8 @@ struct StepState {
     stairs: Staircase,
     /// Plants along and across phase a for which the current loop is to be designed.
     plants: [Option<FirstOrder>; 2],
-    /// Inertia: q-axis current, A, and whether the measurement is made with it.
-    amperes: f32,
-    measures: bool,
+    /// Inertia: the trial of the free shaft.
+    trial: Trial,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

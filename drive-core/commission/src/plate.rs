@@ -37,6 +37,8 @@ pub(super) struct Plate {
     /// Pole pairs by the nameplate, and in force.
     pub pole_pairs: u8,
     pub pole_pairs_in_force: f32,
+    /// Rated speed, electrical rad/s.
+    pub speed: f32,
     /// Peak of the rated voltage between lines, V.
     pub peak_v: f32,
     /// Rated current, and limit of the q-axis current, A peak.
@@ -86,6 +88,7 @@ impl Plate {
             peak_v: SQRT_2 * plate.voltage_v,
             rated,
             i_q_limit: settings.i_q_limit_a(),
+            speed: (1.0 - plate.slip()) * omega,
             flux: SQRT_2 / SQRT_3 * plate.voltage_v / omega,
             largest_i_d: settings.largest_i_d(settings.current_limit_a()),
             torque_per_ampere: settings.motor.torque_per_ampere(settings.i_d()),

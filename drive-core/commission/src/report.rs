@@ -237,9 +237,14 @@ impl fmt::Display for Report {
     /// Writes step and verdict; the values are shown one by one.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.refusal {
-            None if self.step == Step::Inertia => f.write_str(
-                "inertia: sound; it began with positive torque: if the shaft turned the wrong way then, exchange two lines of the motor",
-            ),
+            None if self.step == Step::Inertia => {
+                let rings = self.values.iter().flatten().any(|value| !value.is_allowed());
+                f.write_str("inertia: sound; it began with positive torque: if the shaft turned the wrong way then, exchange two lines of the motor")?;
+                if rings {
+                    f.write_str("; the shaft rings on an elastic coupling: speed.phase_margin_deg becomes 70, a slower speed loop")?;
+                }
+                Ok(())
+            }
             None => write!(f, "{}: sound", self.step.word()),
             Some(refusal) => write!(f, "{}: refused: {refusal}", self.step.word()),
         }
