@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Computes the numbers and draws the pictures of the theory pages.
+"""Computes the numbers and draws the pictures of the theory pages, and the map of torque over speed.
 
     python3 docs/pictures/theory.py            writes the pictures and the generated tables of the pages
     python3 docs/pictures/theory.py --check    fails if pictures, tables or numbers of the pages differ from what it computes
@@ -11,6 +11,7 @@ the check fails when a page no longer describes the code. Standard library only.
 
 import cmath
 import functools
+import json
 import math
 import re
 import sys
@@ -73,7 +74,8 @@ class Motor:
         self.alpha = 1 / self.tau
         self.r_rotor = self.k_r**2 * self.r_r  # R_R
         plate = data["nameplate"]
-        self.rated_nm = plate["power_w"] / (TAU / 60 * plate["speed_rpm"])
+        self.rated_rpm = plate["speed_rpm"]
+        self.rated_nm = plate["power_w"] / (TAU / 60 * self.rated_rpm)
         self.dc_link = data["inverter"]["dc_link_v"]
 
     def torque(self, i_d, i_q):
@@ -943,6 +945,32 @@ def picture_loop():
 OFFSET_CURRENTS = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0]
 
 
+def picture_torque_map():
+    """Largest torque over the speed, both in percent of the rated values, from the files in results/."""
+    plate = tomllib.loads(source("motors/motulator-2kw2.toml"))
+    rated, pairs = plate["nameplate"]["speed_rpm"], plate["motor"]["pole_pairs"]
+    percent = lambda hz: 100 * 60 * hz / pairs / rated
+    rows = json.loads(source("results/torque-map.json"))["rows"]
+    p = Picture("torque-map", "Largest torque over the speed in percent of the rated values, motoring and generating")
+    v = p.panel((0, 250), (-170, 170), [0, 50, 100, 150, 200, 250], [-150, -100, -50, 0, 50, 100, 150], "speed (% of rated)", "torque (% of rated)", 330)
+    for low, high, color in [(0, percent(16), GREY), (percent(16), percent(26), "#afb8c1")]:
+        p.add(f'<rect x="{num(v.x(low))}" y="{num(v.y1)}" width="{num(v.x(high) - v.x(low))}" height="{num(v.y0 - v.y1)}" fill="{color}" fill-opacity="0.16"/>')
+    v.level(0, dash=None, width=1)
+    v.curve([(100 * rpm / rated, nm) for rpm, nm, _ in rows], BLUE, width=2.8)
+    v.curve([(100 * rpm / rated, -nm) for rpm, _, nm in rows], ORANGE, width=2.8)
+    envelope = json.loads(source("results/torque-envelope.json"))["rows"]
+    of = lambda rpm, nm: (100 * rpm / M.rated_rpm, 100 * nm / M.rated_nm)
+    for column, sign in [(3, 1), (6, -1)]:
+        v.curve([of(row[0], sign * row[column]) for row in envelope], GREEN, "6 4", 2)
+    v.text(0, -95, "injection", GREY, dx=6, dy=5)
+    v.text(percent(16), -72, "back-EMF observer", GREY, dx=6, dy=5)
+    v.text(100, 150, "motoring", BLUE, dx=-14, dy=0)
+    v.text(120, -143, "generating", ORANGE, dx=8, dy=4)
+    v.text(162, 84, "field weakening", GREY)
+    v.text(52, 32, "dissertation's motor", GREEN, dx=4, dy=-8)
+    return p
+
+
 def cell(x, digits):
     text = f"{x:.{digits}f}"
     if float(text) == 0:
@@ -1423,7 +1451,7 @@ def main_saliency(factor, n):
 
 DRAWN = [
     picture_ellipse, picture_q, picture_sensitivity, picture_false_lock, picture_observability, picture_leak, picture_resistance,
-    picture_noise, picture_loop,
+    picture_noise, picture_loop, picture_torque_map,
 ]
 
 

@@ -223,7 +223,9 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
         blocks.filter(|block| block.contains("-p hil-sim documents) -->")).collect::<Vec<_>>()
     };
     let mut known: Vec<_> = results().into_iter().map(|(name, _)| name).collect();
-    known.extend(["experiments", "motors-list", "injection", "budgets"].map(str::to_owned));
+    known.extend(
+        ["experiments", "motors-list", "injection", "budgets", "load-step"].map(str::to_owned),
+    );
     for block in pages().values().flat_map(mine) {
         let name = block.split(' ').next().unwrap();
         assert!(known.iter().any(|known| known == name), "nothing renders the block {name}");
@@ -267,7 +269,23 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
         )
         .unwrap();
     }
-    generated::check("noise.md", "injection", &list);
+    generated::check("performance.md", "injection", &list);
+    let mut shaft = Results::read(&generated::root().join("results/shaft.json"));
+    for row in &mut shaft.rows {
+        let motor = row[0].as_str().unwrap().trim_matches('`').to_owned();
+        let rated = f64::from(Config::of_motor(Some(&motor)).unwrap().drive.nameplate.speed_rpm);
+        for n in [1, 2, 4, 5] {
+            let drop = match &mut row[n] {
+                Value::Array(numbers) => &mut numbers[0],
+                one => one,
+            };
+            *drop = (100.0 * drop.as_f64().unwrap() / rated).into();
+            let column = &mut shaft.columns[n];
+            column.name = column.name.replace("rpm", "% of the rated speed");
+            column.digits[0] = 1;
+        }
+    }
+    generated::check("performance.md", "load-step", &shaft.block());
     let mut list = "| budget | limit |\n|---|---|\n".to_owned();
     for (file, unit) in [("xtask/budgets.toml", "cycles"), ("src/images/full.toml", "bytes")] {
         let budgets = fs::read_to_string(generated::root().join(file)).unwrap();
@@ -276,7 +294,7 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
             writeln!(list, "| {} | {limit} {unit} |", name.replace('_', " ")).unwrap();
         }
     }
-    generated::check("cycles.md", "budgets", &list);
+    generated::check("firmware.md", "budgets", &list);
 }
 
 /// Run with `RESULT=NAME cargo test --release -p hil-sim documents::measure -- --ignored --nocapture`. With

@@ -135,7 +135,7 @@ fn the_page_of_the_hazards_names_what_proves_it() {
         }
         table += "\n";
     }
-    generated::check("hazards.md", "hazards", &table);
+    generated::check("safety-evidence.md", "hazards", &table);
 
     let mut table = "| item | state | by | file | proof |\n|---|---|---|---|---|\n".to_owned();
     for Item { item, state, how, files, classes, tests } in &item {
@@ -157,7 +157,7 @@ fn the_page_of_the_hazards_names_what_proves_it() {
         )
         .unwrap();
     }
-    generated::check("hazards.md", "class-b", &table);
+    generated::check("safety-evidence.md", "class-b", &table);
 
     let mut known = BTreeSet::new();
     functions(&root, &mut known);

@@ -27,7 +27,7 @@ fn page(name: &str) -> String {
 #[test]
 fn the_angle_error_of_the_first_command_is_the_printed_one() {
     let (rms, most) = error(1);
-    let [first, book, figures] = ["README.md", "docs/README.md", "docs/figures.md"].map(page);
+    let [first, book, figures] = ["README.md", "docs/README.md", "docs/performance.md"].map(page);
     let sentence = format!("flux angle is {rms:.1}° rms and {most:.0}° at most");
     assert!(first.contains(&sentence) && book.contains(&sentence), "{sentence}");
     let seeds: Vec<_> = (1..=8).map(error).collect();
@@ -100,7 +100,7 @@ fn the_figures_are_those_of_the_runs() {
         "current_step_warm_error_max_deg",
     ];
     let [load, reversal, warm] = numbers("perturbation", 1, steps);
-    let figures = page("docs/figures.md");
+    let figures = page("docs/performance.md");
     for row in [
         format!("(delays left in: up to {left_in:.1}°)"),
         format!("encoder | within {torque:.2} % |"),
@@ -110,9 +110,9 @@ fn the_figures_are_those_of_the_runs() {
             "load step of 0.6 Nm on a free shaft, sensorless | angle error ≤ {load:.1}° in 72 runs"
         ),
         format!(
-            "angle error ≤ {reversal:.1}° in 24 runs; rotor 30 % warmer than believed: ≤ {warm:.1}° |"
+            "angle error ≤ {reversal:.1}° in 24 runs; rotor 30 % warmer than learned: ≤ {warm:.1}° |"
         ),
     ] {
-        assert!(figures.contains(&row), "docs/figures.md lacks: {row}");
+        assert!(figures.contains(&row), "docs/performance.md lacks: {row}");
     }
 }

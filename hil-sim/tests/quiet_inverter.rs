@@ -1,4 +1,4 @@
-//! The switching frequency of the inverter: the effect of 12 and 18 kHz, compared with 6 kHz. `docs/noise.md` has the table.
+//! The switching frequency of the inverter: the effect of 12 and 18 kHz, compared with 6 kHz. `docs/performance.md` has the table.
 
 use std::f64::consts::TAU;
 

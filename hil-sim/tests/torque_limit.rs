@@ -72,9 +72,9 @@ fn the_page_prints_the_torque_limits() {
     let least = others.iter().copied().fold(f64::MAX, f64::min);
     let most = others.iter().copied().fold(0.0, f64::max);
     assert!(most - least < 1.0, "one number is enough for all: {others:?}");
-    let sentence = format!("[others](docs/motors.md#torque) {least:.0} %,");
+    let sentence = format!("[others](docs/performance.md#torque-at-standstill) {least:.0} %,");
     assert!(first.contains(&sentence), "README.md: {sentence}");
-    generated::check("motors.md", "torque", &table);
+    generated::check("performance.md", "torque", &table);
 }
 
 /// 3/2 P L_m^2/L_r i_d i_q, compared with power and speed of the nameplate: the default motor takes 2.25 A at 0.7 A

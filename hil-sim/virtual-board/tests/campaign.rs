@@ -7,7 +7,7 @@ use virtual_board::campaign::{self, Selection, Without};
 use virtual_board::power_stage::REFERENCE;
 use virtual_board::{Board, Image};
 
-const PAGE: &str = include_str!("../../../docs/campaign.md");
+const PAGE: &str = include_str!("../../../docs/safety-evidence.md");
 /// `movs r0, #0; bx lr`: a function that detects nothing.
 const FINDS_NOTHING: [u8; 4] = [0x00, 0x20, 0x70, 0x47];
 const SYSCFG_CFGR2: u32 = 0x4001_001c;

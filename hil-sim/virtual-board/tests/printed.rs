@@ -6,7 +6,7 @@ use drive_core::{Fault, State};
 use hil_sim::Config;
 use virtual_board::{Image, Options, Pair};
 
-/// Cycles of the control interrupt that `docs/demodulators.md` names.
+/// Cycles of the control interrupt that `docs/sources.md` names.
 const CYCLES: u32 = 4_000;
 
 /// The chain as printed cannot track, so its angle and then the drive is lost; the rectified one tracks a shaft at rest. Every period of
