@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Computes the numbers and draws the pictures of the theory pages, and the map of torque over speed.
+"""Computes the numbers and draws the pictures of the theory pages, the map of torque over speed,
+and the system.
 
     python3 docs/pictures/theory.py            writes the pictures and the generated tables of the pages
     python3 docs/pictures/theory.py --check    fails if pictures, tables or numbers of the pages differ from what it computes
@@ -971,6 +972,54 @@ def picture_torque_map():
     return p
 
 
+def picture_system():
+    """From the mains to the shaft, and the drive between the current sensors and the gates."""
+    p = Picture("system", "From the mains to the shaft: rectifier, dc link, inverter, motor; below, the drive with its two sources of the flux angle")
+    p.height = 372
+
+    def box(x, y, w, h, lines, color):
+        p.add(f'<rect x="{x}" y="{y}" width="{w}" height="{h}" rx="5" fill="{color}" fill-opacity="0.08" stroke="{color}" stroke-width="1.6"/>')
+        for n, text in enumerate(lines):
+            p.text(x + w / 2, y + h / 2 + 5 + 17 * (n - (len(lines) - 1) / 2), text, color if n == 0 else GREY, "middle", "" if n == 0 else "s")
+
+    p.text(8, 50, "mains", GREY, style="s")
+    p.line(8, 60, 46, 60, GREY, 1.5, arrow=True)
+    box(48, 34, 82, 52, ["rectifier"], GREY)
+    p.line(130, 60, 158, 60, GREY, 1.5, arrow=True)
+    box(160, 34, 74, 52, ["dc link"], GREY)
+    p.line(234, 60, 262, 60, GREY, 1.5, arrow=True)
+    box(264, 34, 82, 52, ["inverter"], GREY)
+    p.line(346, 60, 386, 60, GREY, 1.5, arrow=True)
+    p.add(f'<circle cx="416" cy="60" r="28" fill="{GREY}" fill-opacity="0.08" stroke="{GREY}" stroke-width="1.6"/>')
+    p.text(416, 65, "motor", GREY, "middle")
+    p.line(444, 60, 476, 60, GREY, 5)
+    p.text(474, 48, "shaft", GREY, "end", "s")
+    p.add(f'<rect x="8" y="128" width="464" height="234" rx="5" fill="none" stroke="{INK}" stroke-width="1.6" stroke-dasharray="6 4"/>')
+    p.text(20, 151, "the drive: STM32G474, 6 kHz", INK, style="b")
+    p.line(305, 168, 305, 88, BLUE, 1.8, arrow=True)
+    p.text(299, 112, "duties", BLUE, "end", "s")
+    p.line(366, 60, 366, 208, BLUE, 1.8)
+    p.line(366, 208, 366, 226, BLUE, 1.8)
+    p.text(372, 112, "phase currents", BLUE, style="s")
+    box(196, 168, 150, 56, ["current control", "i_d flux, i_q torque"], BLUE)
+    box(20, 168, 130, 56, ["references", "torque or speed"], GREY)
+    p.line(150, 196, 194, 196, GREY, 1.5, arrow=True)
+    p.line(366, 196, 348, 196, BLUE, 1.8, arrow=True)
+    box(20, 244, 130, 84, ["injection", "600 Hz, across the", "estimated flux"], ORANGE)
+    p.line(150, 262, 224, 262, ORANGE, 1.8)
+    p.line(224, 262, 224, 226, ORANGE, 1.8, arrow=True)
+    box(240, 244, 222, 44, ["demodulation of the injection", "standstill, low speed"], ORANGE)
+    box(240, 300, 222, 44, ["back-EMF observer", "from 16 Hz"], GREEN)
+    p.line(366, 226, 366, 242, BLUE, 1.8, arrow=True)
+    p.line(240, 322, 190, 322, INK, 1.8)
+    p.line(240, 270, 190, 270, INK, 1.8)
+    p.line(190, 322, 190, 276, INK, 1.8)
+    p.line(190, 276, 190, 216, INK, 1.8)
+    p.line(190, 216, 195, 216, INK, 1.8, arrow=True)
+    p.text(156, 346, "flux angle φ", INK, style="s")
+    return p
+
+
 def cell(x, digits):
     text = f"{x:.{digits}f}"
     if float(text) == 0:
@@ -1451,7 +1500,7 @@ def main_saliency(factor, n):
 
 DRAWN = [
     picture_ellipse, picture_q, picture_sensitivity, picture_false_lock, picture_observability, picture_leak, picture_resistance,
-    picture_noise, picture_loop, picture_torque_map,
+    picture_noise, picture_loop, picture_torque_map, picture_system,
 ]
 
 

@@ -380,6 +380,21 @@ fn links_lead_somewhere() {
             }
         }
     }
+    let book: toml::Table =
+        toml::from_str(&fs::read_to_string(root.join("docs/book.toml")).unwrap()).unwrap();
+    for (old, new) in book["output"]["html"]["redirect"].as_table().expect("the redirects") {
+        let page = |address: &str| format!("docs/{}.md", address.trim_start_matches('/'));
+        let (new, anchor) = new.as_str().unwrap().split_once(".html").expect("a page");
+        let known = anchors.get(&page(new));
+        if known.is_none_or(|known| !anchor.is_empty() && !known.contains(&anchor[1..])) {
+            wrong.push(format!("docs/book.toml: {new}.html{anchor}"));
+        }
+        let (old, anchor) = old.split_once(".html").expect("a page");
+        let remains = |known: &BTreeSet<_>| anchor.is_empty() || known.contains(&anchor[1..]);
+        if anchors.get(&page(old)).is_some_and(remains) {
+            wrong.push(format!("docs/book.toml: {old}{anchor} exists"));
+        }
+    }
     let summary = &pages["docs/SUMMARY.md"];
     let in_book = |name: &str| name == "SUMMARY.md" || summary.contains(&format!("({name})"));
     let docs = pages.keys().filter_map(|name| name.strip_prefix("docs/"));
