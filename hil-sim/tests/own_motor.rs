@@ -209,7 +209,7 @@ fn the_first_hour_states_what_its_commands_show() {
             number(&steps, "angle_error_rms_deg"),
             number(&steps, "angle_error_max_deg")
         ),
-        format!("angle error is {:.1}° rms |", number(&speeds, "angle_error_rms_deg")),
+        format!("angle error is {:.1}° rms:", number(&speeds, "angle_error_rms_deg")),
     ] {
         assert!(page.contains(&part), "docs/first-hour.md: {part}");
     }

@@ -5,8 +5,6 @@ use hil_sim::config::motors::Motor;
 use hil_sim::experiments::{DEFAULT, run};
 use sim_bench::rig::Rig;
 
-use crate::cli_common::{folder, hil_sim, text};
-
 /// Returns numbers of an experiment.
 fn numbers<const N: usize>(experiment: &str, seed: u64, names: [&str; N]) -> [f64; N] {
     let metrics = run(experiment, &Config::default(), seed).unwrap().metrics;
@@ -40,16 +38,6 @@ fn the_angle_error_of_the_first_command_is_the_printed_one() {
         "angle error {rms:.1}° rms, {most:.0}° at most; seeds 1 to 8: {a:.1}° to {b:.1}° rms, {c:.1}° to {d:.1}° at most"
     );
     assert!(figures.contains(&row), "{row}");
-}
-
-/// The README shows the output of its first command.
-#[test]
-fn the_readme_shows_what_the_first_command_prints() {
-    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md"));
-    let readme = readme.unwrap();
-    let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next());
-    let output = hil_sim(&folder("first-command"), &[]);
-    assert_eq!(shown.expect("a block `text`").trim(), text(&output.stdout).trim());
 }
 
 /// Largest deviation of the torque from its mean at standstill without load, in percent of the rated torque, which is

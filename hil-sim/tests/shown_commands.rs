@@ -101,6 +101,44 @@ fn commands_of(text: &str) -> Vec<String> {
     commands
 }
 
+/// A block `text` whose first line is `$ cargo sim` with its arguments shows what this command prints; a line `...` stands for lines left out. The
+/// commands of a page run in one folder, which has the motor of the nameplate on that page.
+#[test]
+fn shown_output_is_what_the_command_prints() {
+    let mut pages = Vec::new();
+    documents(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."), &mut pages);
+    let mut shown = 0;
+    for page in pages {
+        let document = std::fs::read_to_string(&page).unwrap();
+        let folder = folder("shown-output");
+        if let Some(plate) = document.split("--plate \"").nth(1).and_then(|s| s.split('"').next()) {
+            let made = hil_sim(&folder, &["motors", "--plate", plate]);
+            std::fs::write(folder.join("my-motor.toml"), made.stdout).unwrap();
+        }
+        for block in document.split("```text\n$ cargo sim").skip(1) {
+            let (command, rest) = block.split_once('\n').unwrap();
+            let (words, quoted) = command.split_once(" \"").unwrap_or((command, ""));
+            let quoted = quoted.strip_suffix('"');
+            let words: Vec<_> = words.split_whitespace().chain(quoted).collect();
+            let output = hil_sim(&folder, &words);
+            let printed = format!("{}{}", text(&output.stdout), text(&output.stderr));
+            let mut lines = printed.lines().map(str::trim_end);
+            let mut skips = false;
+            for line in rest.split("```").next().unwrap().lines() {
+                let found = match skips {
+                    _ if line == "..." => true,
+                    true => lines.any(|one| one == line),
+                    false => lines.next() == Some(line),
+                };
+                assert!(found, "{}: {command}: {line}", page.display());
+                skips = line == "...";
+            }
+            shown += 1;
+        }
+    }
+    assert!(shown > 5, "{shown}");
+}
+
 #[test]
 fn commands_are_found_in_blocks_and_in_lines() {
     let text = "Type `cargo sim list` or:\n\n```\n$ cargo sim   # the drive\nokay\n```\nand `cargo sim` too.\n";
