@@ -41,17 +41,12 @@ fn shown(act: &Act) -> (bool, String) {
 }
 
 fn page(table: &Table) -> String {
-    let names: Vec<&String> = table.boards[0].values.keys().collect();
-    let mut text = format!(
-        "| board | {} |\n|---|",
-        names.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(" | ")
-    );
-    text += &"---|".repeat(names.len());
-    for board in &table.boards {
-        let values: Vec<&str> = names.iter().map(|name| board.values[*name].as_str()).collect();
-        write!(text, "\n| {} | {} |", board.name, values.join(" | ")).unwrap();
+    let boards: Vec<&str> = table.boards.iter().map(|board| board.name.as_str()).collect();
+    let mut text = format!("| | {} |\n|---|{}\n", boards.join(" | "), "---|".repeat(boards.len()));
+    for name in table.boards[0].values.keys() {
+        let values: Vec<_> = table.boards.iter().map(|board| board.values[name].as_str()).collect();
+        writeln!(text, "| {name} | {} |", values.join(" | ")).unwrap();
     }
-    text += "\n\nV; noise, mean and SENSOR in A; DEAD in µs; UNDER: just below TRIP; HIGHSIDE and LOWSIDE: the level at which a gate goes on.\n";
     let mut number = 0;
     for part in &table.parts {
         write!(text, "\n## {}\n\n{}\n\n", part.title, part.before.trim()).unwrap();
