@@ -11,7 +11,7 @@ use std::{env, fs};
 
 use hil_sim::Config;
 use hil_sim::config::motors::Motor;
-use hil_sim::experiments::{EXPERIMENTS, WITH_INPUT};
+use hil_sim::experiments::{EXPERIMENTS, Experiment, WITH_INPUT};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -238,9 +238,10 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
             generated::check(page.trim_start_matches("docs/"), &name, &block);
         }
     }
-    let mut list = "| name | stands for |\n|---|---|\n".to_owned();
+    let mut list = "| name | shows | stands for |\n|---|---|---|\n".to_owned();
     for experiment in EXPERIMENTS.iter().chain(&*WITH_INPUT) {
-        writeln!(list, "| `{}` | {} |", experiment.name, experiment.stands_for).unwrap();
+        let Experiment { name, about, stands_for, .. } = experiment;
+        writeln!(list, "| `{name}` | {about} | {stands_for} |").unwrap();
     }
     generated::check("simulator.md", "experiments", &list);
     let mut list = "| name | motor | unverified |\n|---|---|---|\n".to_owned();

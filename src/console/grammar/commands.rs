@@ -61,10 +61,10 @@ commands! { words;
         None => Order::Commission(Step::Nameplate, Step::LAST),
         Some(first) => Order::Commission(first, words.optional().map_or(Ok(first), step)?),
     };
-    5: "accept", ["", "put in force what `commission` has found, and save"] => Order::Accept;
-    6: "learn", ["[again]", "learn the motor, shaft locked; again: at another rotor position, on top of what is learned"] => Order::Learn { again: words.flag("again")? };
+    5: "accept", ["", "apply what `commission` has found, and save"] => Order::Accept;
+    6: "learn", ["[again]", "learn the motor, shaft locked; again: at another rotor position, added to what is learned"] => Order::Learn { again: words.flag("again")? };
     7: "stop", ["[ramp|quick|now]", "torque to zero, then off; ramp, quick: speed to zero first, by speed.ramp_rpm_per_s or speed.quick_rpm_per_s; now: off at once"] => words.optional_of(Order::Stop(Stop::Coast), "the way to stop", "ramp quick now", &STOPS)?;
-    8: "relock", ["", "no torque, magnetise again, verify the lock, go on"] => Order::Relock;
+    8: "relock", ["", "drop the torque, magnetise again, verify the lock, continue"] => Order::Relock;
     9: "torque", ["A", "q-axis current, A peak"] => Order::Torque(words.number("the current, A")?);
     10: "speed", ["RPM", "speed, mechanical rpm"] => Order::Speed(words.number("the speed, rpm")?);
     11: "jog", ["RPM", "turn at this speed while it is repeated every 0.5 s, then to rest by the ramp"] => Order::Jog(words.number("the speed, rpm")?);
@@ -76,7 +76,7 @@ commands! { words;
     });
     14: "angle", ["encoder|injection", "where the flux angle comes from; the same as set angle_source"]
         => Request::Set([assigned(setting("angle_source")?, words.next("encoder or injection")?)?].into_iter().collect());
-    15: "get", ["[KEY|PREFIX]", "one setting with range and meaning, or all that begin so"] => match words.optional().map(|name| (name, keys::find(name))) {
+    15: "get", ["[KEY|PREFIX]", "one setting with range and meaning, or all with this prefix"] => match words.optional().map(|name| (name, keys::find(name))) {
         None => Request::List(ListKind::Settings("")),
         Some((_, Some(key))) => Request::Get(key),
         Some((name, None)) => Request::List(ListKind::Settings(prefix(name)?)),
@@ -86,7 +86,7 @@ commands! { words;
         word => Request::List(ListKind::Describe(word.map_or(Ok(""), prefix)?)),
     };
     17: "set", ["KEY VALUE ...", "stage values, several in a line; the drive must be off"] => Request::Set(assignments(words)?);
-    18: "apply", ["", "put the staged values in force; start does so, too"] => Order::Apply;
+    18: "apply", ["", "put the staged values into force; start does so, too"] => Order::Apply;
     19: "revert", ["", "drop the staged values"] => Order::Revert;
     20: "save", ["", "apply, then keep settings and learned values over a reset"] => Order::Save;
     21: "defaults", ["", "stage the settings of the image"] => Order::Defaults;
@@ -98,7 +98,7 @@ commands! { words;
     };
     24: "faults", ["[NUMBER]", "the latched fault with causes and cure, and what ended the last run"] => Request::Faults(words.optional().map(fault).transpose()?);
     25: "history", ["", "hours with power and with current, starts, and the last faults"] => Request::List(ListKind::History);
-    26: "clear", ["", "forget the latched fault"] => Order::Clear;
+    26: "clear", ["", "clear the latched fault"] => Order::Clear;
     27: "trace",
         ["N [DIVIDER] [NAME]", "record N periods, every DIVIDER-th, of the signals named; print as CSV"],
         ["N ... on fault", "record until a fault; then `trace` prints it"],
@@ -130,7 +130,7 @@ commands! { words;
         "gates-off",
         &[("gates-off", Order::Update)],
     )?;
-    33: "board", ["[NAME]", "the board with what is assumed of it; NAME: the lines that follow are for that board"] => match words.optional() {
+    33: "board", ["[NAME]", "the board and what is assumed; NAME: the next lines are for that board only"] => match words.optional() {
         None => Request::List(ListKind::Board),
         Some(word) => {
             let one_of = ParseError::OneOf { what: "the board", word, all: boards::ALL_NAMES };

@@ -24,10 +24,10 @@ fn row(trust: &Trust) -> String {
     };
     let current = match trust.current {
         Check::Off => "no",
-        Check::Wide => "tolerantly",
-        Check::Narrow => "strictly",
+        Check::Wide => "wide threshold",
+        Check::Narrow => "normal threshold",
     };
-    let mean = if trust.mean_voltage { "judged" } else { "begins anew" };
+    let mean = if trust.mean_voltage { "judged" } else { "restarts" };
     let resistance = match (trust.resistance, trust.measures_drop) {
         (true, false) => "by flux or injection",
         (false, true) => "with the inverter voltage error",
@@ -39,7 +39,7 @@ fn row(trust: &Trust) -> String {
 
 /// Each phase of the flux and each frame has its row in docs/control-law.md.
 #[test]
-fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
+fn every_phase_and_frame_has_a_row_of_valid_estimates() {
     let mut settings = Settings::default();
     (settings.observer.enabled, settings.sequence.flying_start) = (true, true);
     let c = settings.build().unwrap();
@@ -62,10 +62,10 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
         for frame in [Frame::Encoder, Frame::LockedShaft, Frame::Tracked] {
             let field = Field { flux: flux.clone(), frame, ..Field::default() };
             let name = match (number, frame) {
-                (0, _) => "looking for a turning shaft in a fixed frame",
-                (1, _) => "looking for a turning shaft in a rotating frame",
-                (2, _) => "standing, the asymmetry is measured",
-                (3, _) => "turning, found in a fixed frame",
+                (0, _) => "flying start, search in a fixed frame",
+                (1, _) => "flying start, search in a rotating frame",
+                (2, _) => "at rest, the asymmetry is measured",
+                (3, _) => "rotating shaft, found in a fixed frame",
                 (4, _) => "0.2 s later, or found in a rotating frame",
                 (5, Frame::LockedShaft) => "magnetising to learn",
                 (5, Frame::Encoder | Frame::Tracked) => "magnetising",
