@@ -251,7 +251,7 @@ fn rows_of_runs_can_be_analysed() {
     let number = |row: usize, name: &str| rows[row][column(name)].parse::<f64>().unwrap();
     assert_eq!((number(3, "run"), number(3, "case_seed")), (2.0, 1_000_005.0));
     assert!((0.5..=3.0).contains(&number(3, "case_iq_a").abs()));
-    let page = include_str!("../../docs/statistics.md");
+    let page = include_str!("../../docs/simulator.md");
     assert!(rows[0].iter().all(|head| page.contains(&format!("`{head}`"))), "{:?}", rows[0]);
     // The worst of the rows is the worst of the result.
     let worst = (1..7).map(|row| number(row, "error_rms_deg")).fold(0.0, f64::max);
