@@ -3,13 +3,13 @@
 //! `cargo run --release -p hil-sim --example own_experiment > swing.csv`
 
 use drive_core::{Command, Mode};
-use hil_sim::config::{Config, Value};
+use hil_sim::Config;
 use hil_sim::rig::Rig;
 
 fn main() -> Result<(), hil_sim::error::Error> {
     // A motor of the folder `motors`, and keys as --set takes them.
     let mut config = Config::of_motor(Some("motulator-2kw2"))?;
-    config.set("load.mode", &Value::Word("locked".into()))?;
+    config.set("load.mode", "locked")?;
 
     // The drive learns the motor first, because the motor's file says so.
     let mut rig = Rig::started(&config, 1, Mode::Torque)?;

@@ -93,10 +93,10 @@ impl Options {
             [] => {}
             ["speed"] => return refused("write --load speed RPM"),
             ["speed", rpm] => {
-                config.set("load.mode", &Value::from_text("speed"))?;
-                config.set("load.speed_rpm", &Value::from_text(rpm))?;
+                config.set("load.mode", "speed")?;
+                config.set("load.speed_rpm", rpm)?;
             }
-            [mode] => config.set("load.mode", &Value::from_text(mode))?,
+            [mode] => config.set("load.mode", mode)?,
             _ => return refused("only speed takes a number"),
         }
         Ok(config)

@@ -5,8 +5,6 @@ use std::path::PathBuf;
 use clap::Args;
 use sim_bench::prelude::*;
 
-use crate::config::Value;
-
 /// The options that describe a simulation.
 #[derive(Args, Clone, Default)]
 pub struct Input {
@@ -46,10 +44,10 @@ impl Input {
         let mut config =
             Config::load(self.motor.as_deref(), self.config.as_deref(), &self.assignments)?;
         if let Some(plant) = &self.plant {
-            config.set("plant", &Value::Word(plant.clone()))?;
+            config.set("plant", plant)?;
         }
         if let Some(seconds) = self.seconds {
-            config.set("seconds", &Value::Number(seconds))?;
+            config.set("seconds", seconds)?;
         }
         Ok(config)
     }

@@ -3,7 +3,6 @@
 use drive_stream::client::split_tag;
 use serde_json::Value;
 
-use crate::config::Value::Number;
 use crate::config::motors::NEEDED;
 use crate::config::passport::{Measured, Passport, SCHEMA};
 use crate::first_light::interruptible;
@@ -219,7 +218,7 @@ pub fn of_trace(outcome: &Outcome, config: &Config, file: &Path) -> Passport {
     ];
     let mut twin = toml::Table::from_iter(found.map(|(name, value)| (name.into(), value.into())));
     for key in Key::all().filter(|key| NEEDED.split(' ').any(|name| name == key.name())) {
-        if let Number(value) = key.get(config) {
+        if let Some(value) = key.number(config) {
             twin.entry(key.name()).or_insert(value.into());
         }
     }

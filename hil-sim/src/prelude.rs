@@ -9,7 +9,7 @@ pub use rand::{Rng, RngExt};
 pub use sim_bench::prelude::*;
 pub use sim_lab::texts;
 
-pub use crate::config::{Key, RangeKind, Value};
+pub use crate::config::{Key, RangeKind};
 pub use crate::error::{cut, message, parser_text, printable};
 pub use crate::input::{Input, OUT};
 pub use crate::random::{seeded, sign};

@@ -1,14 +1,14 @@
 //! Keys, files and motors of the configuration.
 
 use hil_sim::config::motors::Motor;
-use hil_sim::config::{Allowed, BENCH, Key, Value, flattened, plant_settings};
+use hil_sim::config::{BENCH, Key, flattened, plant_settings};
 use hil_sim::error::nearest;
 use hil_sim::{Config, Error};
 
 fn set(assignment: &str) -> Result<Config, Error> {
     let mut config = Config::default();
     let (key, value) = assignment.split_once('=').unwrap();
-    config.set(key, &Value::from_text(value))?;
+    config.set(key, value)?;
     Ok(config)
 }
 
@@ -23,15 +23,15 @@ fn every_default_is_allowed_and_every_key_round_trips() {
     for key in Key::all().chain(Key::after()) {
         let (mut config, name) = (Config::default(), key.name());
         let value = key.get(&config);
-        assert_eq!(key.set(&mut config, &value), Ok(()), "{name}");
+        assert_eq!(key.set(&mut config, &value.to_string()), Ok(()), "{name}");
         assert_eq!(config, Config::default(), "{name}");
         assert!(!key.help().is_empty(), "{name}");
         // The value passes through text, as with --set, and is not the default.
-        let text = match key.allowed() {
-            Allowed::Range { max, .. } => max.to_string(),
-            Allowed::Words(words) => words[0].to_owned(),
-            Allowed::Switch => "yes".to_owned(),
-        };
+        let text =
+            key.range().map_or(key.words().last().map(|word| word.to_string()), |(_, max)| {
+                Some(max.to_string())
+            });
+        let text = text.expect(name);
         let config = set(&format!("{}={text}", key.assigned_name())).expect(name);
         let found = key.get(&config).to_string();
         let same = found == text
@@ -54,7 +54,7 @@ fn names_are_unique() {
 #[test]
 fn just_outside_the_range_is_refused() {
     for key in BENCH {
-        if let Allowed::Range { min, max } = key.allowed {
+        if let Some((min, max)) = key.range(&Config::default()) {
             for value in [min - 1.0, max + 1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
                 assert!(set(&format!("{}={value}", key.name)).is_err(), "{} {value}", key.name);
             }

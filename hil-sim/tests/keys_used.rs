@@ -1,6 +1,6 @@
 //! Determines the keys that an experiment uses by changing each of them.
 
-use hil_sim::config::{Allowed, Config, Key, RangeKind, Value};
+use hil_sim::config::{Config, Key, RangeKind};
 use hil_sim::experiments::{Context, EXPERIMENTS, Experiment};
 use hil_sim::outcome::Origin;
 use hil_sim::progress::Progress;
@@ -33,37 +33,28 @@ const SAMPLES: [(&str, f64); 12] = [
 ];
 
 /// Returns other values that a key allows.
-fn others(key: Key, config: &Config) -> Vec<Value> {
-    let set = match key.get(config) {
-        Value::Number(value) if value != 0.0 => value,
-        Value::Switch(on) => return vec![Value::Switch(!on)],
-        Value::Word(word) if word != "auto" => {
-            let Allowed::Words(words) = key.allowed() else { return Vec::new() };
-            let others = words.iter().filter(|other| **other != word);
-            return others.map(|other| Value::Word((*other).to_owned())).collect();
-        }
-        value => {
-            let sample = SAMPLES.iter().find(|(name, _)| *name == key.name());
-            match (sample, key, value) {
-                (Some((_, sample)), ..) => *sample,
-                (_, Key::Drive(entry), Value::Word(_)) => {
-                    entry.number(&config.drive).unwrap_or(1.0).into()
-                }
-                _ => match key.allowed() {
-                    Allowed::Range { max, .. } if max <= 10.0 => 0.2 * max,
-                    Allowed::Range { min, max } => 0.5 * (min.max(0.0) + max.min(100.0)),
-                    _ => return Vec::new(),
-                },
-            }
-        }
+fn others(key: Key, config: &Config) -> Vec<String> {
+    let now = key.get(config);
+    let Some((min, max)) = key.range() else {
+        let words = key.words().iter().map(|word| (*word).to_owned());
+        return words.filter(|word| *word != now.to_string()).collect();
     };
-    let Allowed::Range { min, max } = key.allowed() else { return Vec::new() };
+    let set = match (key.number(config), key) {
+        (Some(number), _) if number != 0.0 => number,
+        _ if let Some((_, sample)) = SAMPLES.iter().find(|(name, _)| *name == key.name()) => {
+            *sample
+        }
+        (None, Key::Drive(entry)) => entry.number(&config.drive).unwrap_or(1.0).into(),
+        _ if max <= 10.0 => 0.2 * max,
+        _ => 0.5 * (min.max(0.0) + max.min(100.0)),
+    };
     let whole = set.fract() == 0.0 && set.abs() >= 1.0;
     [1.0, 1.25, 0.3, 4.0]
         .map(|factor| (factor * set).clamp(min, max))
-        .map(|value| Value::Number(if whole { value.round().max(1.0) } else { value }))
+        .map(|value| if whole { value.round().max(1.0) } else { value })
         .into_iter()
-        .filter(|value| *value != key.get(config))
+        .filter(|value| key.number(config) != Some(*value))
+        .map(|value| value.to_string())
         .collect()
 }
 
@@ -76,7 +67,7 @@ fn short(name: &str) -> Config {
         _ => 3,
     });
     // Free shafts, all regions.
-    config.full_range.kind = Some(RangeKind::LoadSteps);
+    config.full_range.kind = RangeKind::LoadSteps;
     (config.record.minutes, config.record.reversal_s) = (0.05, 1.0);
     config.extent.seconds = Some(match name {
         "demodulators" => 1.0,
@@ -156,13 +147,13 @@ fn observed(experiment: &Experiment) -> Vec<Key> {
         if !set.clone().all(|(name, _)| is_declared(name)) {
             continue;
         }
-        set.for_each(|(name, value)| base.set(name, &Value::from_text(value)).expect("a key"));
+        set.for_each(|(name, value)| base.set(name, value).expect("a key"));
         let default = result(experiment, &base);
         for key in Key::all() {
             let pending = !used.iter().any(|known| known.name() == key.name() && known.assigned_name() == key.assigned_name())
                 // With other settings, only the keys that are still missing.
                 && (beside.is_empty() || (experiment.uses_key(key) && !is_quiet(key.name())));
-            let changes = |value: Value| {
+            let changes = |value: String| {
                 let mut config = base.clone();
                 config.set(&key.assigned_name(), &value).is_ok()
                     && result(experiment, &config) != default

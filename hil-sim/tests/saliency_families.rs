@@ -1,7 +1,7 @@
 //! The saliency that emerges at 600 Hz, compared with the results of an independent plant, which shares no code with this one.
 
 use hil_sim::config::motors::Motor;
-use hil_sim::config::{Config, Value, plant_settings};
+use hil_sim::config::{Config, plant_settings};
 use hil_sim::experiments::saliency::Probe;
 use hil_sim::plant::{
     Complex, ElectricalState as _, EnergyMachine, EnergyState, MachineModel as _,
@@ -10,7 +10,7 @@ use hil_sim::plant::{
 fn probe(assignments: &[(&str, &str)]) -> Probe {
     let mut config = Config::default();
     for (key, value) in assignments {
-        config.set(key, &Value::from_text(value)).expect(key);
+        config.set(key, value).expect(key);
     }
     Probe::new(&config).expect("a motor")
 }
@@ -150,8 +150,8 @@ fn the_flux_level_is_a_key() {
     assert_eq!(probe(&[("plant", "m6")]).i_d, 0.7);
     let large = {
         let mut config = Config::of_motor(Some("modelica-18kw5")).expect("a motor");
-        config.set("plant", &Value::from_text("m6")).expect("plant");
-        config.set("flux_level", &Value::from_text("high")).expect("flux level");
+        config.set("plant", "m6").expect("plant");
+        config.set("flux_level", "high").expect("flux level");
         Probe::new(&config).expect("a motor").i_d
     };
     // Rated flux: 400 V sqrt(2/3)/(2 pi 50 Hz) = 1.040 Wb, over 70.45 mH.
@@ -195,7 +195,7 @@ fn keys_that_do_nothing_are_refused() {
     ] {
         let mut config = Config::default();
         for (key, value) in set {
-            config.set(key, &Value::from_text(value)).expect(key);
+            config.set(key, value).expect(key);
         }
         let text = Probe::new(&config).err().expect("refused").to_string();
         assert!(text.starts_with(named) && text.contains("does not use it"), "{text}");
@@ -229,7 +229,7 @@ fn both_leakages_saturate_as_measured_on_every_motor() {
         for (family, side) in [("rl", 0), ("rl", 1), ("gl", 0), ("gl", 1)] {
             let mut config = Config::of_motor(Some(&motor.name)).expect("a motor");
             for (key, value) in [("plant", family), ("iron.teeth", "0")] {
-                config.set(key, &Value::from_text(value)).expect(key);
+                config.set(key, value).expect(key);
             }
             let plant = plant_settings(&config);
             let machine = EnergyMachine::new(&plant.machine, &plant.iron.expect("iron")).unwrap();

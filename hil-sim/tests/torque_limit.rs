@@ -95,7 +95,7 @@ fn a_limit_says_what_binds_and_what_raises_it() {
     let sensors = TorqueLimit::new(&config, (3.5_f64.powi(2) - 0.7 * 0.7).sqrt());
     assert!(sensors.binds.contains("`limits.current_a`"), "{sensors:?}");
     let mut small = config.clone();
-    small.set("measurement.range_a", &hil_sim::config::Value::Number(3.0)).unwrap();
+    small.set("measurement.range_a", 3.0).unwrap();
     let limit_a = f64::from(small.drive.current_limit_a());
     let by_range = TorqueLimit::new(&small, (limit_a * limit_a - 0.49).sqrt());
     assert!(by_range.binds.contains("`measurement.range_a`"), "{by_range:?}");

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::cli_common::{files, folder, hil_sim, object, text};
 use drive_core::{Command, Mode};
-use hil_sim::config::{Config, Value};
+use hil_sim::Config;
 use hil_sim::rig::Rig;
 
 /// Returns the trace of one second of a drive with an encoder on a dynamometer that changes speed, while torque and
@@ -19,7 +19,7 @@ fn recorded_trace(changes: &[(&str, &str)]) -> String {
         ("saliency.b1", "0"),
     ];
     for (key, value) in set.iter().chain(changes) {
-        config.set(key, &Value::from_text(value)).expect("a key");
+        config.set(key, value).expect("a key");
     }
     let mut rig = Rig::started(&config, 3, Mode::Torque).expect("a start");
     let mut trace = "time_s,i_alpha_a,i_beta_a,u_alpha_v,u_beta_v,speed_rpm\n".to_owned();

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use drive_settings::value::Words as _;
 use hil_sim::config::{Key, Value};
 use hil_sim::input::Input;
 use pyo3::prelude::*;
@@ -49,9 +50,12 @@ impl Config {
             let name = key.assigned_name();
             match key.get(&self.values) {
                 Value::Number(number) => settings.set_item(name, number)?,
-                Value::Switch(on) => settings.set_item(name, on)?,
+                Value::Whole(number) => settings.set_item(name, number)?,
+                Value::Word(word) if key.words() == bool::WORDS => {
+                    settings.set_item(name, word == true.word())?;
+                }
                 Value::Word(word) => settings.set_item(name, word)?,
-                Value::Unset => settings.set_item(name, py.None())?,
+                Value::Auto => settings.set_item(name, py.None())?,
             }
         }
         Ok(settings)

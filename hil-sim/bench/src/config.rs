@@ -14,24 +14,26 @@ pub mod motors;
 pub mod passport;
 mod plant;
 pub mod plate;
-mod value;
 mod words;
 
 use std::f32::consts::TAU;
+use std::fmt::Display;
 use std::path::Path;
 
 use drive_core::{Coefficients, Line, PERIOD_S};
 use drive_settings::rules::CARRIER_HZ;
-use drive_settings::{Settings, SettingsError, find, value as drive};
+use drive_settings::{Settings, SettingsError, find, value};
 
 use file::FileAssignment;
-pub use key::{Key, check_model};
+pub use key::{BenchKey, Key, check_model};
 pub use keys::*;
 pub use plant::{current_lines, flux_level_a, open_phase, plant_settings};
-pub use value::{Allowed, Value};
 
 use crate::error::{Error, cut};
 use motors::Motor;
+
+/// A value of a key.
+pub type Value = value::Value<f64>;
 
 /// Prefix of the keys that set the drive alone.
 const DRIVE: &str = "drive.";
@@ -62,7 +64,7 @@ impl Config {
         }
         for assignment in assignments {
             let (name, value) = assigned(assignment.as_ref())?;
-            config.set(name, &Value::from_text(value))?;
+            config.set(name, value)?;
         }
         Ok(config)
     }
@@ -79,17 +81,18 @@ impl Config {
         Ok(config)
     }
 
-    /// Sets one key. If it returns an error, nothing has changed.
+    /// Sets one key to a value, which may be a number, a word, a value of TOML or the text of one of them. If it returns an error, nothing
+    /// has changed.
     ///
     /// # Errors
     /// [`Error::Unknown`]; [`Error::Value`] with the key, the value and the allowed values.
-    pub fn set(&mut self, name: &str, value: &Value) -> Result<(), Error> {
-        let (name, value) = alias::today(name, value);
+    pub fn set(&mut self, name: &str, value: impl Display) -> Result<(), Error> {
+        let (name, value) = alias::today(name, &value.to_string());
         let mut changed = self.clone();
         for key in Key::named(&name)? {
             key.set(&mut changed, &value).map_err(|problem| Error::Value {
                 key: name.clone(),
-                value: value.to_string(),
+                value: value.clone(),
                 problem,
                 allowed: key.allowed_text(),
             })?;
@@ -184,7 +187,7 @@ impl Config {
             if value != key.get(&rebuilt) {
                 let change = (key.assigned_name(), value);
                 // Every value in the configuration is an allowed one.
-                let _ = rebuilt.set(&change.0, &change.1);
+                let _ = rebuilt.set(&change.0, change.1);
                 changes.push(format!("{}={}", change.0, change.1));
             }
         }
@@ -198,7 +201,7 @@ impl Config {
 /// [`Error::Refused`] with the setting. If nobody set it, the message adds what its rule depends on.
 pub fn built(settings: &Settings) -> Result<Coefficients, Error> {
     settings.build().map_err(|error| {
-        let is_auto = |name| find(name).is_some_and(|it| it.get(settings) == drive::Value::Auto);
+        let is_auto = |name| find(name).is_some_and(|it| it.get(settings) == value::Value::Auto);
         let by_rule = matches!(error, SettingsError::Range { name, .. } if is_auto(name));
         let rule = "; it was not set: its rule follows from nameplate, motor, measurement.range_a and inverter.dc_link_v";
         Error::Refused(format!("{error}{}", if by_rule { rule } else { "" }))
@@ -220,23 +223,23 @@ pub fn assigned(assignment: &str) -> Result<(&str, &str), Error> {
 /// # Errors
 /// As [`Key::named`].
 pub fn keys_of(name: &str) -> Result<Vec<Key>, Error> {
-    Key::named(&alias::today(name, &Value::Unset).0)
+    Key::named(&alias::today(name, "").0)
 }
 
 /// Returns the assignments of a table; those for the drive alone come last.
-pub fn flattened(table: &toml::Table) -> Vec<(String, Value)> {
+pub fn flattened(table: &toml::Table) -> Vec<(String, toml::Value)> {
     let mut assignments = Vec::new();
     flatten("", table, &mut assignments);
     assignments.sort_by_key(|(name, _)| name.starts_with(DRIVE));
     assignments
 }
 
-fn flatten(prefix: &str, table: &toml::Table, into: &mut Vec<(String, Value)>) {
+fn flatten(prefix: &str, table: &toml::Table, into: &mut Vec<(String, toml::Value)>) {
     for (name, value) in table {
         let name = format!("{prefix}{name}");
         match value {
             toml::Value::Table(inner) => flatten(&format!("{name}."), inner, into),
-            value => into.push((name, Value::from_toml(value))),
+            value => into.push((name, value.clone())),
         }
     }
 }

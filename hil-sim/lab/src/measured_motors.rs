@@ -2,7 +2,6 @@
 
 use std::f64::consts::SQRT_2;
 
-use sim_bench::config::Value;
 use sim_bench::config::motors::{self, Motor};
 use sim_bench::plant::{EnergyState, phases};
 
@@ -135,7 +134,7 @@ impl Supplied {
 pub fn started(linear: bool) -> Result<[f64; 4], Error> {
     let mut config = config("dissertation", "laboratory-4kw.toml")?;
     if linear {
-        CIRCUIT.iter().try_for_each(|(key, value)| config.set(key, &Value::Number(*value)))?;
+        CIRCUIT.iter().try_for_each(|(key, value)| config.set(key, value))?;
         (config.iron.leakage_saturation, config.iron.rotor_leakage_saturation) = (None, None);
     }
     let mut motor = Supplied::new(&config)?;

@@ -59,7 +59,6 @@ pub fn keys(prefix: Option<&str>, as_toml: bool, input: &Input) -> Result<String
 
 fn key_text(key: Key, config: &Config) -> String {
     let value = match key.get(config) {
-        Value::Unset => "unset".to_owned(),
         Value::Number(number) => format!("{number} {}", key.unit()).trim_end().to_owned(),
         other => other.to_string(),
     };

@@ -35,7 +35,7 @@ pub fn check(name: &str, experiments: &[&Experiment], input: &Input) -> Result<(
     let mut unused = Vec::new();
     for assignment in file::read(path)? {
         let before = config.clone();
-        config.set(&assignment.name, &assignment.value)?;
+        config.set(&assignment.name, assignment.value)?;
         if config != before && !is_used(&assignment.name)? {
             unused.push(assignment.name);
         }

@@ -119,7 +119,7 @@ pub struct Scenario {
     shaft: Shaft,
     parts: Vec<Part>,
     /// Settings that apply where the configuration has the default.
-    settings: Vec<(String, Value)>,
+    settings: Vec<(String, toml::Value)>,
     /// Whether it comes from rows: then `--seconds` cuts or extends it, instead of stretching it.
     from_rows: bool,
     /// Figures, metrics and judgement.

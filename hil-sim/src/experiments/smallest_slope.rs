@@ -123,7 +123,6 @@ fn weakened(config: &Config, share: f64) -> Config {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Value;
 
     /// The sensitivity of model A at standstill is twice its saliency; with linear teeth and with saturation it
     /// decreases with its source.
@@ -131,7 +130,7 @@ mod tests {
     fn a_weaker_source_is_a_smaller_slope() {
         let slope = |plant: &str, share: f64| {
             let mut config = Config::default();
-            config.set("plant", &Value::Word(plant.to_owned())).unwrap();
+            config.set("plant", plant).unwrap();
             let probe = Probe::new(&weakened(&config, share)).unwrap();
             probe.slope(probe.i_d, 0.0).unwrap()
         };

@@ -81,7 +81,7 @@ fn apart(motor: &str, runs: u32) -> (usize, f64, f64) {
     original.prepare.learn = true;
     let twin = Config::of_motor(path.to_str()).unwrap();
     let [original, twin] = [original, twin].map(|mut config| {
-        config.full_range.kind = Some(RangeKind::Constant);
+        config.full_range.kind = RangeKind::Constant;
         config.extent.runs = Some(runs);
         find("full-range").unwrap().outcome(&config, 1).unwrap().metrics
     });

@@ -1,7 +1,7 @@
 //! Rows of a table of settings.
 
 use super::SettingsError;
-use super::value::{AUTO, Value, ValueError, number as parsed};
+use super::value::{AUTO, Real, Value, ValueError, number as parsed};
 
 /// When a changed setting takes effect, and who may change it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,8 +40,8 @@ impl Guard {
     }
 }
 
-/// A setting of the structure `S`: number, name, unit, help, range, and access to its value.
-pub struct Entry<S: 'static> {
+/// A setting of the structure `S`, with numbers of type `N`: number, name, unit, help, range, and access to its value.
+pub struct Entry<S: 'static, N: 'static = f32> {
     /// Number of the setting in the flash and of its registers on the bus. It never changes, and no other setting ever gets it.
     pub id: u16,
     /// Name at the console and in files.
@@ -58,51 +58,54 @@ pub struct Entry<S: 'static> {
     pub hardware: bool,
     /// Whether the setting protects, and which changes are allowed from elsewhere than the console.
     pub guard: Guard,
-    access: Access<S>,
-    range: Range<S>,
+    access: Access<S, N>,
+    range: Range<S, N>,
 }
 
 /// Access to a value: the function that reads it, and the function that writes it.
-pub enum Access<S> {
+pub enum Access<S, N = f32> {
     /// A number.
-    Number(fn(&S) -> f32, fn(&mut S, f32)),
+    Number(fn(&S) -> N, fn(&mut S, N)),
     /// A number that follows a rule while it is `None`. The third function reads the number in effect.
-    Auto(fn(&S) -> Option<f32>, fn(&mut S, Option<f32>), fn(&S) -> f32),
+    Auto(fn(&S) -> Option<N>, fn(&mut S, Option<N>), fn(&S) -> N),
     /// A whole number, which is limited to the largest value of the range when it is written.
     Whole(fn(&S) -> u32, fn(&mut S, u32)),
+    /// A whole number that follows a rule while it is `None`.
+    AutoWhole(fn(&S) -> Option<u32>, fn(&mut S, Option<u32>)),
     /// One of these words, as its position among them; see [`Words`](super::value::Words).
     Word(fn(&S) -> usize, fn(&mut S, usize), &'static [&'static str]),
 }
 
-enum Range<S> {
-    Fixed(f32, f32),
+enum Range<S, N> {
+    /// For a word.
+    None,
+    Fixed(N, N),
     /// The range depends on other settings.
-    Beside(fn(&S) -> (f32, f32)),
+    Beside(fn(&S) -> (N, N)),
 }
 
-impl<S> Entry<S> {
+impl<S, N: Real> Entry<S, N> {
     /// Creates a setting that anybody may change while the outputs are off. A number also needs its range.
     pub const fn new(
         id: u16,
         name: &'static str,
         unit: &'static str,
-        access: Access<S>,
+        access: Access<S, N>,
         help: &'static str,
     ) -> Self {
-        let range = Range::Fixed(0.0, 0.0);
-        let change = Change::WhileOff;
+        let (range, change) = (Range::None, Change::WhileOff);
         let (learned, hardware, guard) = (false, false, Guard::None);
         Self { id, name, unit, help, change, learned, hardware, guard, access, range }
     }
 
     /// Accepts values from `min` to `max`, both included.
-    pub const fn from_to(mut self, min: f32, max: f32) -> Self {
+    pub const fn from_to(mut self, min: N, max: N) -> Self {
         self.range = Range::Fixed(min, max);
         self
     }
 
     /// Accepts values in a range that depends on other settings.
-    pub const fn beside(mut self, range: fn(&S) -> (f32, f32)) -> Self {
+    pub const fn beside(mut self, range: fn(&S) -> (N, N)) -> Self {
         self.range = Range::Beside(range);
         self
     }
@@ -132,11 +135,12 @@ impl<S> Entry<S> {
     }
 
     /// Returns the value.
-    pub fn get(&self, settings: &S) -> Value {
+    pub fn get(&self, settings: &S) -> Value<N> {
         match self.access {
             Access::Number(get, _) => Value::Number(get(settings)),
             Access::Auto(get, ..) => get(settings).map_or(Value::Auto, Value::Number),
             Access::Whole(get, _) => Value::Whole(get(settings)),
+            Access::AutoWhole(get, _) => get(settings).map_or(Value::Auto, Value::Whole),
             Access::Word(get, _, words) => {
                 Value::Word(words.get(get(settings)).copied().unwrap_or_default())
             }
@@ -144,31 +148,26 @@ impl<S> Entry<S> {
     }
 
     /// Returns the number in effect, which is the number of the rule for `auto`; `None` for a word.
-    pub fn number(&self, settings: &S) -> Option<f32> {
+    pub fn number(&self, settings: &S) -> Option<N> {
         match self.access {
             Access::Number(get, _) => Some(get(settings)),
             Access::Auto(.., effective) => Some(effective(settings)),
-            Access::Whole(get, _) => Some(get(settings) as f32),
+            Access::Whole(get, _) => Some(N::of_whole(get(settings))),
+            Access::AutoWhole(get, _) => get(settings).map(N::of_whole),
             Access::Word(..) => None,
-        }
-    }
-
-    /// Returns the number in effect, or the position of a word.
-    pub fn level(&self, settings: &S) -> f32 {
-        match self.access {
-            Access::Word(get, ..) => get(settings) as f32,
-            _ => self.number(settings).unwrap_or(f32::NAN),
         }
     }
 
     /// Sets a value of this setting's type; a value of another type changes nothing. The range is checked by
     /// [`check`](Self::check), since it may depend on other settings that are still to be set.
-    pub fn set(&self, settings: &mut S, value: Value) {
+    pub fn set(&self, settings: &mut S, value: Value<N>) {
         match (&self.access, value) {
             (Access::Number(_, set), Value::Number(value)) => set(settings, value),
             (Access::Auto(_, set, _), Value::Number(value)) => set(settings, Some(value)),
             (Access::Auto(_, set, _), Value::Auto) => set(settings, None),
             (Access::Whole(_, set), Value::Whole(value)) => set(settings, value),
+            (Access::AutoWhole(_, set), Value::Whole(value)) => set(settings, Some(value)),
+            (Access::AutoWhole(_, set), Value::Auto) => set(settings, None),
             (Access::Word(_, set, words), Value::Word(word)) => {
                 if let Some(place) = words.iter().position(|known| *known == word) {
                     set(settings, place);
@@ -182,15 +181,15 @@ impl<S> Entry<S> {
     ///
     /// # Errors
     /// The text is not a value of this setting.
-    pub fn parse(&self, text: &str) -> Result<Value, ValueError> {
+    pub fn parse(&self, text: &str) -> Result<Value<N>, ValueError> {
         match self.access {
             Access::Number(..) => parsed(text).map(Value::Number).ok_or(ValueError::Number),
-            Access::Auto(..) if text == AUTO => Ok(Value::Auto),
+            Access::Auto(..) | Access::AutoWhole(..) if text == AUTO => Ok(Value::Auto),
             Access::Auto(..) => parsed(text).map(Value::Number).ok_or(ValueError::NumberOrAuto),
-            Access::Whole(..) => {
+            Access::Whole(..) | Access::AutoWhole(..) => {
                 // Larger numbers may not fit the type of the setting.
                 let Range::Fixed(_, max) = self.range else { return Err(ValueError::Whole(0)) };
-                let max = max as u32;
+                let max = max.to_whole();
                 let value = text.parse().ok().filter(|value| *value <= max);
                 value.map(Value::Whole).ok_or(ValueError::Whole(max))
             }
@@ -198,6 +197,35 @@ impl<S> Entry<S> {
                 let word = words.iter().find(|word| **word == text);
                 word.map(|word| Value::Word(word)).ok_or(ValueError::Word(words))
             }
+        }
+    }
+
+    /// Returns the range with the present settings, `(min, max)`; `None` for a word.
+    pub fn range(&self, settings: &S) -> Option<(N, N)> {
+        match &self.range {
+            Range::None => None,
+            Range::Fixed(min, max) => Some((*min, *max)),
+            Range::Beside(range) => Some(range(settings)),
+        }
+    }
+
+    /// Returns the words that may be set; none for a number.
+    pub fn words(&self) -> &'static [&'static str] {
+        if let Access::Word(.., words) = self.access { words } else { &[] }
+    }
+
+    /// Whether the setting follows a rule unless it is set.
+    pub fn has_rule(&self) -> bool {
+        matches!(self.access, Access::Auto(..) | Access::AutoWhole(..))
+    }
+}
+
+impl<S> Entry<S> {
+    /// Returns the number in effect, or the position of a word.
+    pub fn level(&self, settings: &S) -> f32 {
+        match self.access {
+            Access::Word(get, ..) => get(settings) as f32,
+            _ => self.number(settings).unwrap_or(f32::NAN),
         }
     }
 
@@ -221,25 +249,6 @@ impl<S> Entry<S> {
         let holds = value >= min && value <= max;
         let outside = SettingsError::Range { name: self.name, unit: self.unit, value, min, max };
         holds.then_some(()).ok_or(outside)
-    }
-
-    /// Returns the range with the present settings, `(min, max)`; `None` for a word.
-    pub fn range(&self, settings: &S) -> Option<(f32, f32)> {
-        match (&self.access, &self.range) {
-            (Access::Word(..), _) => None,
-            (_, Range::Fixed(min, max)) => Some((*min, *max)),
-            (_, Range::Beside(range)) => Some(range(settings)),
-        }
-    }
-
-    /// Returns the words that may be set; none for a number.
-    pub fn words(&self) -> &'static [&'static str] {
-        if let Access::Word(.., words) = self.access { words } else { &[] }
-    }
-
-    /// Whether the setting follows a rule unless it is set.
-    pub fn has_rule(&self) -> bool {
-        matches!(self.access, Access::Auto(..))
     }
 
     /// Whether two sets of settings have the same value in effect. NaN is never the same.
@@ -268,6 +277,11 @@ macro_rules! entry {
         // The range is within the range of the type, see `parse`.
         Entry::new($id, $name, "", Access::Whole(
             |s: &Settings| s.$($path.)*$field as u32, |s, value| s.$($path.)*$field = value as $type
+        ), $help)
+    };
+    ($id:literal: auto_whole(), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        Entry::new($id, $name, "", Access::AutoWhole(
+            |s: &Settings| s.$($path.)*$field, |s, value| s.$($path.)*$field = value
         ), $help)
     };
     ($id:literal: word($($unit:expr)?), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {

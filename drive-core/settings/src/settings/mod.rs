@@ -39,9 +39,7 @@ words! {
         /// Three shunts below the low sides.
         LowSide = "low-side",
     }
-}
 
-words! {
     /// Switching frequencies, kHz.
     pub enum Carrier {
         /// One pulse per control period.
@@ -76,9 +74,7 @@ words! {
         /// with it.
         Motor = "motor",
     }
-}
 
-words! {
     /// Temperature sensors of a motor.
     pub enum SensorKind {
         /// There is none.
@@ -90,9 +86,7 @@ words! {
         /// Silicon, 1000 ohm at 100 °C.
         Kty84 = "kty84",
     }
-}
 
-words! {
     /// Flux with which the drive magnetises the motor.
     pub enum Flux {
         /// The flux of the dissertation, 15 % of the rated flux of its motor, with the current limit and trip of its drive.

@@ -2,16 +2,43 @@
 
 use core::fmt;
 
-use lexical_parse_float::FromLexical as _;
+use lexical_parse_float::FromLexical;
+
+/// A number of a table of settings: `f32` in the drive, `f64` on the bench of the simulator.
+pub trait Real: FromLexical + PartialOrd + Copy + 'static {
+    /// Whether it is neither infinite nor NaN.
+    fn is_finite(self) -> bool;
+    /// Converts a whole number.
+    fn of_whole(whole: u32) -> Self;
+    /// Converts to a whole number; a fraction is cut off.
+    fn to_whole(self) -> u32;
+}
+
+macro_rules! real {
+    ($($type:ident)+) => {$(
+        impl Real for $type {
+            fn is_finite(self) -> bool {
+                self.is_finite()
+            }
+            fn of_whole(whole: u32) -> Self {
+                whole as Self
+            }
+            fn to_whole(self) -> u32 {
+                self as u32
+            }
+        }
+    )+};
+}
+real!(f32 f64);
 
 /// A value of a setting.
 ///
 /// Exhaustive on purpose: every kind of value has to be stored and shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(untagged))]
-pub enum Value {
+pub enum Value<N = f32> {
     /// A finite number.
-    Number(f32),
+    Number(N),
     /// The number that the rule of the setting gives; see [`rules`](super::rules).
     Auto,
     /// A whole number.
@@ -20,7 +47,7 @@ pub enum Value {
     Word(&'static str),
 }
 
-impl fmt::Display for Value {
+impl<N: fmt::Display> fmt::Display for Value<N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number(value) => value.fmt(f),
@@ -52,8 +79,8 @@ pub enum ValueError {
 }
 
 /// Returns the finite number that a text stands for: digits with optional sign, point and power of ten (`-0.5`, `1e-3`).
-pub fn number(text: &str) -> Option<f32> {
-    f32::from_lexical(text.as_bytes()).ok().filter(|value| value.is_finite())
+pub fn number<N: Real>(text: &str) -> Option<N> {
+    N::from_lexical(text.as_bytes()).ok().filter(|value| value.is_finite())
 }
 
 /// A type whose values are written as words.
@@ -79,17 +106,17 @@ pub trait Words: Copy + PartialEq + 'static {
     }
 }
 
-/// Declares an enumeration and its [`Words`], which must be in scope; or the words of an enumeration that is declared elsewhere.
+/// Declares enumerations and their [`Words`], which must be in scope; or the words of an enumeration that is declared elsewhere.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! words {
-    ($(#[$about:meta])* pub enum $type:ident { $($(#[$more:meta])* $variant:ident = $word:literal,)+ }) => {
+    ($($(#[$about:meta])* pub enum $type:ident { $($(#[$more:meta])* $variant:ident = $word:literal,)+ })+) => {$(
         $(#[$about])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum $type { $($(#[$more])* $variant,)+ }
 
         $crate::words!($type { $($variant = $word,)+ });
-    };
+    )+};
     ($type:ident { $($variant:ident = $word:literal,)+ }) => {
         impl Words for $type {
             const WORDS: &'static [&'static str] = &[$($word),+];
@@ -120,7 +147,7 @@ mod tests {
             "inf", "-inf", "infinity",
         ];
         for text in refused {
-            assert_eq!(number(text), None, "{text}");
+            assert_eq!(number::<f32>(text), None, "{text}");
         }
         for (text, value) in
             [("000000000000000000000000001.5", 1.5), ("+.5", 0.5), ("-2e-3", -2e-3)]

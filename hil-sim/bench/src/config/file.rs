@@ -5,7 +5,7 @@ use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
 
-use super::{Allowed, Config, Key, Value, flattened};
+use super::{Config, Key, Value, flattened};
 use crate::bounded;
 use crate::error::{Error, parser_text};
 
@@ -14,7 +14,7 @@ pub struct FileAssignment {
     /// Name of the key, as written.
     pub name: String,
     /// Its value.
-    pub value: Value,
+    pub value: toml::Value,
     /// Its line, counted from 1.
     pub line: u64,
 }
@@ -53,8 +53,7 @@ fn find(prefix: &str, table: &DeTable<'_>, into: &mut BTreeMap<String, usize>) {
     }
 }
 
-/// Writes keys of the configuration as a file that [`read`] accepts, with units and meanings as comments. Keys that are
-/// not set are commented out.
+/// Writes keys of the configuration as a file that [`read`] accepts, with units and meanings as comments.
 pub fn toml(config: &Config, keys: &[Key]) -> String {
     let names: Vec<&str> = Key::all().map(Key::name).collect();
     // A name that is also the beginning of other names cannot be a table.
@@ -83,19 +82,6 @@ fn line(key: Key, name: &str, value: &Value) -> String {
         unit => format!("{unit}; "),
     };
     let comment = format!("# {unit}{}", key.help());
-    match value {
-        Value::Unset => format!("# {name} = {}  {comment}\n", sample(key)),
-        Value::Switch(on) => format!("{name} = {on}  {comment}\n"),
-        Value::Word(word) => format!("{name} = \"{word}\"  {comment}\n"),
-        Value::Number(number) => format!("{name} = {number}  {comment}\n"),
-    }
-}
-
-/// Returns an example value for a key that is not set.
-fn sample(key: Key) -> String {
-    match key.allowed() {
-        Allowed::Range { min, .. } => min.to_string(),
-        Allowed::Words(words) => format!("\"{}\"", words.first().copied().unwrap_or_default()),
-        Allowed::Switch => "true".to_owned(),
-    }
+    let quote = if matches!(value, Value::Word(_) | Value::Auto) { "\"" } else { "" };
+    format!("{name} = {quote}{value}{quote}  {comment}\n")
 }

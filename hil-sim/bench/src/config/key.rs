@@ -3,11 +3,16 @@
 use std::collections::BTreeMap;
 
 use drive_settings::entry::Entry;
-use drive_settings::{SETTINGS, Settings, find, value as drive};
+use drive_settings::value::{AUTO, ValueError, Words as _};
+use drive_settings::{SETTINGS, Settings, find};
 
-use super::value::{Field as _, double};
-use super::{Allowed, BENCH, BenchKey, Config, DRIVE, PlantModel, Value};
+use super::{BENCH, Config, DRIVE, PlantModel, Value};
 use crate::error::Error;
+
+/// A row of the table of the bench.
+pub type BenchKey = Entry<Config, f64>;
+/// Prefix of the keys that take effect after the saliency self-commissioning.
+const AFTER: &str = "after.";
 
 /// A key of the bench or of the drive.
 #[derive(Clone, Copy)]
@@ -40,18 +45,19 @@ impl Key {
     /// # Errors
     /// [`Error::Unknown`] with the most similar name.
     pub fn named(name: &str) -> Result<Vec<Self>, Error> {
-        if let Some(key) = Self::after().find(|key| key.name() == name) {
-            return Ok(vec![key]);
-        }
-        let (bench, drive) = match name.strip_prefix(DRIVE) {
-            Some(name) => (None, find(name)),
-            None => (on_bench(name), find(name)),
+        let keys: Vec<_> = if let Some(name) = name.strip_prefix(AFTER) {
+            Self::after().filter(|key| key.name() == name).collect()
+        } else {
+            let bare = name.strip_prefix(DRIVE);
+            let bench = on_bench(name).filter(|_| bare.is_none()).map(Self::Bench);
+            bench.into_iter().chain(find(bare.unwrap_or(name)).map(Self::Drive)).collect()
         };
-        let keys: Vec<_> =
-            bench.map(Self::Bench).into_iter().chain(drive.map(Self::Drive)).collect();
         if keys.is_empty() {
-            let known = Self::all().chain(Self::after()).map(Self::name);
-            return Err(Error::unknown("key", name, known));
+            let known: Vec<_> = Self::all()
+                .map(|key| key.name().to_owned())
+                .chain(Self::after().map(Self::assigned_name))
+                .collect();
+            return Err(Error::unknown("key", name, known.iter().map(String::as_str)));
         }
         Ok(keys)
     }
@@ -59,9 +65,8 @@ impl Key {
     /// Returns the name in the key's own table.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Bench(key) => key.name,
+            Self::Bench(entry) | Self::After(entry) => entry.name,
             Self::Drive(entry) => entry.name,
-            Self::After(key) => key.after,
         }
     }
 
@@ -71,6 +76,7 @@ impl Key {
             Self::Drive(entry) if on_bench(entry.name).is_some() => {
                 format!("{DRIVE}{}", entry.name)
             }
+            Self::After(entry) => format!("{AFTER}{}", entry.name),
             _ => self.name().to_owned(),
         }
     }
@@ -78,83 +84,120 @@ impl Key {
     /// Returns the unit, empty for a pure number.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Bench(key) | Self::After(key) => key.unit,
+            Self::Bench(entry) | Self::After(entry) => entry.unit,
             Self::Drive(entry) => entry.unit,
         }
     }
 
     /// Returns the meaning.
     pub fn help(self) -> &'static str {
-        match self {
-            Self::Bench(key) | Self::After(key) => key.doc.trim().trim_end_matches('.'),
+        let help = match self {
+            Self::Bench(entry) | Self::After(entry) => entry.help,
             Self::Drive(entry) => entry.help,
+        };
+        help.trim().trim_end_matches('.')
+    }
+
+    /// Returns the range of a number. The drive's values are checked together with its other settings when it is built; the range returned
+    /// here holds with the defaults.
+    pub fn range(self) -> Option<(f64, f64)> {
+        match self {
+            Self::Bench(entry) | Self::After(entry) => entry.range(&Config::default()),
+            Self::Drive(entry) => {
+                entry.range(&Settings::default()).map(|(min, max)| (double(min), double(max)))
+            }
         }
     }
 
-    /// Returns the allowed values. The drive's values are checked together with its other settings when it is built;
-    /// the range returned here holds with the defaults.
-    pub fn allowed(self) -> Allowed {
+    /// Returns the words that may be set; none for a number.
+    pub fn words(self) -> &'static [&'static str] {
         match self {
-            Self::Bench(key) | Self::After(key) => key.allowed,
-            Self::Drive(entry) => match entry.range(&Settings::default()) {
-                Some((min, max)) => Allowed::Range { min: double(min), max: double(max) },
-                None => Allowed::Words(entry.words()),
-            },
+            Self::Bench(entry) | Self::After(entry) => entry.words(),
+            Self::Drive(entry) => entry.words(),
         }
     }
 
     /// Returns the allowed values in words, with the unit.
     pub fn allowed_text(self) -> String {
-        let has_rule = matches!(self, Self::Drive(entry) if entry.has_rule());
-        let auto = if has_rule { ", or auto" } else { "" };
-        match self.allowed() {
-            Allowed::Range { min, max } => {
-                let range = format!("{min} to {max} {}", self.unit());
-                format!("{}{auto}", range.trim_end())
-            }
-            Allowed::Words(words) => words.join(", "),
-            Allowed::Switch => "yes, no".to_owned(),
-        }
+        let has_rule = match self {
+            Self::Bench(entry) | Self::After(entry) => entry.has_rule(),
+            Self::Drive(entry) => entry.has_rule(),
+        };
+        let Some((min, max)) = self.range() else { return self.words().join(", ") };
+        let range = format!("{min} to {max} {}", self.unit());
+        format!("{}{}", range.trim_end(), if has_rule { ", or auto" } else { "" })
     }
 
     /// Reads the value.
     pub fn get(self, config: &Config) -> Value {
         match self {
-            Self::Bench(key) => (key.get)(config),
-            Self::After(key) => config.after.get(key.name).cloned().unwrap_or(Value::Unset),
+            Self::Bench(entry) => entry.get(config),
+            Self::After(entry) => config.after.get(entry.name).copied().unwrap_or(Value::Auto),
             Self::Drive(entry) => match entry.get(&config.drive) {
-                drive::Value::Number(value) => Value::Number(double(value)),
-                drive::Value::Whole(value) => Value::Number(value.into()),
-                drive::Value::Word(word) => Value::Word(word.to_owned()),
-                drive::Value::Auto => Value::Word(drive::AUTO.to_owned()),
+                drive_settings::value::Value::Number(value) => Value::Number(double(value)),
+                drive_settings::value::Value::Auto => Value::Auto,
+                drive_settings::value::Value::Whole(value) => Value::Whole(value),
+                drive_settings::value::Value::Word(word) => Value::Word(word),
             },
         }
     }
 
-    /// Sets the value.
+    /// Reads a number; none for a word, and for a number that is not set.
+    pub fn number(self, config: &Config) -> Option<f64> {
+        match self.get(config) {
+            Value::Number(number) => Some(number),
+            Value::Whole(number) => Some(number.into()),
+            Value::Auto | Value::Word(_) => None,
+        }
+    }
+
+    /// Sets the value that a text stands for. A word may stand in quotation marks.
     ///
     /// # Errors
     /// The reason why the value is not allowed.
-    pub fn set(self, config: &mut Config, value: &Value) -> Result<(), &'static str> {
+    pub fn set(self, config: &mut Config, text: &str) -> Result<(), &'static str> {
+        let text = if self.words().is_empty() { text } else { text.trim_matches('"') };
         match self {
-            Self::Bench(key) => (key.set)(config, value),
-            Self::After(key) => set_after(config, key, value),
+            Self::Bench(entry) => set_on_bench(entry, config, text),
+            Self::After(entry) if text == AUTO => {
+                config.after.remove(entry.name);
+                Ok(())
+            }
+            Self::After(entry) => {
+                let mut checked = config.clone();
+                set_on_bench(entry, &mut checked, text)?;
+                config.after.insert(entry.name, entry.get(&checked));
+                Ok(())
+            }
             Self::Drive(entry) => {
-                let value = entry.parse(&value.to_string()).map_err(reason)?;
-                entry.set(&mut config.drive, value);
+                entry.set(&mut config.drive, entry.parse(text).map_err(reason)?);
                 Ok(())
             }
         }
     }
 }
 
-fn reason(error: drive::ValueError) -> &'static str {
+/// Sets a value of the bench, and checks that it is in its range.
+fn set_on_bench(entry: &BenchKey, config: &mut Config, text: &str) -> Result<(), &'static str> {
+    let value = entry.parse(text).map_err(reason)?;
+    entry.set(config, value);
+    let is_within = |(min, max)| entry.number(config).is_some_and(|it| (min..=max).contains(&it));
+    let is_allowed = value == Value::Auto || entry.range(config).is_none_or(is_within);
+    if is_allowed { Ok(()) } else { Err("out of range") }
+}
+
+fn reason(error: ValueError) -> &'static str {
     match error {
-        drive::ValueError::Number => "not a finite number",
-        drive::ValueError::NumberOrAuto => "neither a finite number nor auto",
-        drive::ValueError::Whole(_) => "not a whole number in the range",
-        drive::ValueError::Word(_) => "not one of the words",
+        ValueError::Number => "not a number",
+        ValueError::NumberOrAuto => "neither a number nor auto",
+        ValueError::Whole(_) => "not a whole number in the range",
+        ValueError::Word(_) => "not one of the words",
     }
+}
+
+/// Converts single to double precision so that both have the same shortest decimal fraction.
+fn double(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or(number.into())
 }
 
 /// Groups of the keys of the plant that may change; the model and its flux level stay.
@@ -164,18 +207,6 @@ const PLANT: [&str; 8] =
 /// Whether a key belongs to the plant and may change after the saliency self-commissioning.
 fn is_of_plant(key: &BenchKey) -> bool {
     PLANT.iter().any(|group| key.name.starts_with(group))
-}
-
-/// Sets the value that a key has after the saliency self-commissioning, within the usual range of the key.
-fn set_after(config: &mut Config, key: &BenchKey, value: &Value) -> Result<(), &'static str> {
-    if *value == Value::Unset {
-        config.after.remove(key.name);
-        return Ok(());
-    }
-    let mut checked = config.clone();
-    (key.set)(&mut checked, value)?;
-    config.after.insert(key.name, (key.get)(&checked));
-    Ok(())
 }
 
 /// Refuses keys that have no effect with the chosen machine model.
@@ -193,7 +224,7 @@ pub fn check_model(config: &Config) -> Result<(), Error> {
             && key.get(config) != key.get(&default)
     });
     idle.map_or(Ok(()), |key| {
-        let (key, value, plant) = (key.name(), key.get(config), config.model.plant.to_value());
+        let (key, value, plant) = (key.name(), key.get(config), config.model.plant.word());
         let why = format!("plant = {plant} does not use it; it acts with {remedy}");
         Err(Error::Refused(format!("{key} = {value}: {why}")))
     })
@@ -203,12 +234,12 @@ impl Config {
     /// Returns the configuration after the saliency self-commissioning: the bench has changed, the drive has not.
     ///
     /// # Errors
-    /// [`Error::Refused`] with the reason why a value is not allowed, or as [`check_model`].
+    /// As [`check_model`].
     pub fn after_learning(&self) -> Result<Self, Error> {
         let mut config = Self { after: BTreeMap::new(), ..self.clone() };
-        for key in BENCH {
-            if let Some(value) = self.after.get(key.name) {
-                (key.set)(&mut config, value).map_err(Error::refused)?;
+        for entry in BENCH {
+            if let Some(value) = self.after.get(entry.name) {
+                entry.set(&mut config, *value);
             }
         }
         check_model(&config)?;

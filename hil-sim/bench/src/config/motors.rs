@@ -9,7 +9,7 @@ use include_dir::{Dir, include_dir};
 use serde::{Deserialize, Serialize};
 
 use super::passport::Passport;
-use super::{Config, Key, Value, alias, flattened, plate};
+use super::{Config, Key, alias, flattened, plate};
 use crate::bounded;
 use crate::error::{Error, cut, parser_text};
 
@@ -118,7 +118,7 @@ impl Motor {
         }
         let mut config = Config::default();
         let of_plate = self.settings().into_iter().filter(|(key, _)| of_plate(key));
-        of_plate.into_iter().try_for_each(|(key, value)| config.set(&key, &value))?;
+        of_plate.into_iter().try_for_each(|(key, value)| config.set(&key, value))?;
         let estimated = plate::circuit(&config.drive.nameplate)?;
         let keys = estimated.each_ref().map(|(key, _)| (*key).to_owned()).to_vec();
         for (key, value) in estimated {
@@ -138,7 +138,7 @@ impl Motor {
     }
 
     /// Returns the keys that the file sets, with their values.
-    pub fn settings(&self) -> Vec<(String, Value)> {
+    pub fn settings(&self) -> Vec<(String, toml::Value)> {
         flattened(&self.settings)
     }
 
@@ -166,7 +166,7 @@ impl Motor {
                 let why = format!("{} has {count} sources; one [[source]] must name it", cut(&key));
                 return Err(Error::Refused(format!("motor {name}: {why}")));
             }
-            config.set(&key, &value)?;
+            config.set(&key, value)?;
         }
         let missing: Vec<_> =
             NEEDED.split(' ').filter(|key| self.is_own() && !self.says(key)).collect();
@@ -177,35 +177,33 @@ impl Motor {
         if self.is_own() {
             plate::check(config)?;
         }
-        self.implied(config).into_iter().try_for_each(|(key, value, _)| config.set(key, &value))
+        self.implied(config).into_iter().try_for_each(|(key, value, _)| config.set(key, value))
     }
 
     /// Whether the file sets a key.
     fn says(&self, key: &str) -> bool {
-        self.settings().iter().any(|(name, value)| alias::today(name, value).0 == key)
+        self.settings().iter().any(|(name, _)| alias::today(name, "").0 == key)
     }
 
     /// Returns the keys that the file does not set and that follow from others, with the reason. For a motor that comes
     /// with the program these are only the keys that a commissioned drive has.
-    pub fn implied(&self, config: &Config) -> Vec<(&'static str, Value, &'static str)> {
-        let (base, four_digits) = (Config::default(), |value: f64| {
-            Value::Number(format!("{value:.3e}").parse().unwrap_or(value))
-        });
+    pub fn implied(&self, config: &Config) -> Vec<(&'static str, String, &'static str)> {
+        let base = Config::default();
+        let four_digits = |value: f64| format!("{value:.3e}").parse().unwrap_or(value).to_string();
         let range_a = four_digits(config.sensed(base.measurement.range_a));
         let inertia = four_digits(base.motor.inertia * config.rated_nm() / base.rated_nm());
         let flux = if self.says("sequence.i_d") { "sequence.i_d" } else { "sequence.flux" };
-        let word = |word: &str| Value::Word(word.to_owned());
         let commissioned = "by rule: as a commissioned drive has it";
         let all = [
-            ("current_plant", word("motor"), commissioned),
-            (flux, word("high"), commissioned),
+            ("current_plant", "motor".to_owned(), commissioned),
+            (flux, "high".to_owned(), commissioned),
             (
                 "measurement.range_a",
                 range_a,
                 "by rule: rated current, injection and ripple, and 12 %",
             ),
             ("motor.inertia", inertia, "assumed: in proportion to the rated torque"),
-            ("prepare.learn", Value::Switch(true), "by rule: the drive has not learned this motor"),
+            ("prepare.learn", "yes".to_owned(), "by rule: the drive has not learned this motor"),
         ];
         let of_all = |reason| self.is_own() || reason == commissioned;
         all.into_iter().filter(|(key, _, reason)| of_all(*reason) && !self.says(key)).collect()

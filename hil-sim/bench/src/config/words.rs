@@ -3,28 +3,7 @@
 use drive_settings::value::Words;
 use drive_settings::words;
 
-use super::value::{Allowed, Field, Value};
-
-/// Defines types of words that are values of keys.
-macro_rules! words_of_keys {
-    ($($(#[$about:meta])* pub enum $type:ident { $($words:tt)+ })+) => {$(
-        words! { $(#[$about])* pub enum $type { $($words)+ } }
-
-        impl Field for $type {
-            fn to_value(&self) -> Value {
-                Value::Word(self.word().to_owned())
-            }
-
-            fn from_value(value: &Value, _: &Allowed) -> Result<Self, &'static str> {
-                let is = |word: &&str| matches!(value, Value::Word(given) if given == word);
-                let place = Self::WORDS.iter().position(is);
-                place.map(Self::at).ok_or("not one of the words")
-            }
-        }
-    )+};
-}
-
-words_of_keys! {
+words! {
     /// Load on the shaft.
     pub enum LoadMode {
         /// Shaft blocked.
@@ -91,6 +70,8 @@ words_of_keys! {
 
     /// Task of the drive in runs over the whole speed range.
     pub enum RangeKind {
+        /// Every one of the tasks below.
+        All = "all",
         /// Constant torque at constant speed.
         Constant = "constant",
         /// Torque steps between the torque limits at constant speed.

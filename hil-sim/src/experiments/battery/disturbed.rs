@@ -100,11 +100,10 @@ pub fn add(config: &mut Config, all: &[Disturbance], sizes: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Value;
 
     fn config(set: &[(&str, f64)]) -> Config {
         let mut config = Config::default();
-        set.iter().for_each(|(key, value)| config.set(key, &Value::Number(*value)).unwrap());
+        set.iter().for_each(|(key, value)| config.set(key, value).unwrap());
         config
     }
 

@@ -276,7 +276,6 @@ pub fn allowed_a(drive: &Drive, asked: f64) -> Result<f64, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Value;
 
     /// With Table 5 and 2.0 A of magnetising current the vector limit of 3.5 A leaves sqrt(3.5^2 - 2^2) = 2.872 A, and
     /// 62 % of its torque is 0.62 * 3/2 * 2 * 0.1771^2/0.2047 * 2.0 * 2.872 = 1.637 Nm. With 0.7 A the 3 A of the speed
@@ -285,7 +284,7 @@ mod tests {
     fn load_steps_are_shares_of_the_torque_at_the_nominal_limit() {
         let mut config = Config::default();
         assert!((nominal_limit_a(&config) - 3.0).abs() < 1e-6);
-        config.set("sequence.i_d", &Value::Number(2.0)).unwrap();
+        config.set("sequence.i_d", 2.0).unwrap();
         assert!((nominal_limit_a(&config) - 2.872).abs() < 1e-3);
         config.battery.runs = BatteryRuns::Load;
         config.battery.load_share = 0.62;
@@ -308,7 +307,7 @@ mod tests {
             (kinds.iter().filter(is_fixed).count(), kinds.len(), runs)
         };
         assert_eq!(fixed(&config), (0, 7, 168));
-        config.set("plant", &Value::Word("r".into())).unwrap();
+        config.set("plant", "r").unwrap();
         assert_eq!(fixed(&config), (2, 9, 216));
     }
 

@@ -19,10 +19,11 @@ pub struct Case {
 }
 
 impl Case {
-    /// Returns all cases of one kind, or of all kinds.
-    pub fn all(only: Option<RangeKind>) -> Vec<Self> {
-        let kinds = RangeKind::VALUES.iter().copied();
-        let kinds = kinds.filter(|kind| only.is_none_or(|only| only == *kind));
+    /// Returns all cases of one kind, or of all.
+    pub fn all(only: RangeKind) -> Vec<Self> {
+        let is_chosen =
+            |kind: &RangeKind| *kind != RangeKind::All && [RangeKind::All, *kind].contains(&only);
+        let kinds = RangeKind::VALUES.iter().copied().filter(is_chosen);
         let of = |kind| Self::regions(kind).into_iter().map(move |region| Self { kind, region });
         kinds.flat_map(of).collect()
     }

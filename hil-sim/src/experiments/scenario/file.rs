@@ -5,7 +5,7 @@ use toml::Spanned;
 use super::quantity::Named;
 use super::{Part, REFERENCES, Reference, Scenario, Shaft};
 use crate::columns::Columns;
-use crate::config::{Value, flattened};
+use crate::config::flattened;
 use crate::error::{cut, parser_text, unknown};
 use crate::experiments::course::Ramp;
 use crate::prelude::*;
@@ -13,9 +13,9 @@ use crate::prelude::*;
 impl Ramp {
     /// Reads a number, or two in a list.
     fn of(value: &toml::Value) -> Option<Self> {
-        let number = |value: &toml::Value| match Value::from_toml(value) {
-            Value::Number(number) if number.is_finite() => Some(number),
-            _ => None,
+        let number = |value: &toml::Value| {
+            let whole = value.as_integer().map(|whole| whole as f64);
+            value.as_float().or(whole).filter(|number| number.is_finite())
         };
         match value {
             toml::Value::Array(two) if two.len() == 2 => {
@@ -351,7 +351,7 @@ fn references() -> String {
 
 /// Checks the total time of a run, of which every sample is stored, against the range of the key `seconds`.
 fn check_time(seconds: f64) -> Result<(), String> {
-    match Config::default().set("seconds", &Value::Number(seconds)) {
+    match Config::default().set("seconds", seconds) {
         Err(Error::Value { value, problem, allowed, .. }) => Err(format!(
             "the whole time = {value} s: {problem}; allowed: {allowed}. Are the times in milliseconds?"
         )),

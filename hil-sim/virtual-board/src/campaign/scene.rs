@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use anyhow::{Result, bail, ensure};
 use drive_core::State;
 use drive_settings::Settings;
-use hil_sim::config::{Value, assigned};
+use hil_sim::config::assigned;
 use hil_sim::{Config, experiments::full_range::for_the_range, plant::Load};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::{Flash, FlashError, Saved};
@@ -119,7 +119,7 @@ impl Scene {
     ) -> Result<Self> {
         let mut config = stage.config()?;
         for (name, value) in set.iter().map(|one| assigned(one)).collect::<Result<Vec<_>, _>>()? {
-            config.set(name, &Value::from_text(value))?;
+            config.set(name, value)?;
         }
         let (mut torques, mut speeds) = (vec![config.amperes(TORQUE_A)], SPEEDS_RPM.to_vec());
         if let Some(rpm) = rpm {
