@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use crate::cli_common::folder;
+use crate::cli_common::{folder, hil_sim, text};
 
 fn program(path: &Path, text: &str) {
     fs::write(path, format!("#!/bin/sh\n{text}")).unwrap();
@@ -56,5 +56,15 @@ fn a_build_that_fails_is_named() {
     assert_eq!(output.status.code(), Some(1), "{error}");
     for said in ["no compiler", "build of the firmware", "101"] {
         assert!(error.contains(said), "{said} is not in {error}");
+    }
+}
+
+#[test]
+fn a_cargo_that_does_not_run_is_named() {
+    for arguments in [&["board"][..], &["board", "--elf", "some.elf"]] {
+        let output = hil_sim(&folder("no-cargo"), arguments);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        assert!(error.contains("cargo"), "{error}");
     }
 }

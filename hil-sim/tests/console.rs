@@ -4,10 +4,10 @@
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::{Arc, Mutex};
 
+use crate::cli_common::folder;
 use drive_core::{Fault, State};
 use hil_sim::console::catalogue::Catalogue;
 use hil_sim::console::link::{Link, LinkError, is_off};
@@ -109,13 +109,6 @@ fn texts(output: &Output) -> (Option<i32>, String, String) {
     (output.status.code(), text(&output.stdout), text(&output.stderr))
 }
 
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
 #[test]
 fn answers_are_printed_and_unasked_lines_kept_apart() {
     for echo in [false, true] {
@@ -179,13 +172,6 @@ fn the_last_trace_is_plotted() {
     assert!(out.contains("t_s,i_q_a,v_q_v") && out.contains("2 records in"), "{out}");
     let svg = std::fs::read_to_string(file).unwrap();
     assert!(svg.contains("i_q (A)") && svg.contains("v_q (V)") && svg.contains("t (s)"));
-}
-
-#[test]
-fn a_port_that_does_not_open_is_named() {
-    let (code, _, err) = texts(&console("/dev/no-such-port", &["status"]));
-    assert_eq!(code, Some(2));
-    assert!(err.contains("--port /dev/no-such-port"), "{err}");
 }
 
 #[test]

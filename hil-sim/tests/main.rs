@@ -3,7 +3,6 @@
 mod battery;
 mod bench_tests;
 mod board_builds;
-mod board_options;
 mod bounds;
 mod cli_common;
 mod cli_contract;

@@ -1,4 +1,4 @@
-//! A user's motor, for which a file states nameplate, circuit and dc link: its rules, its refusals, and the example of the page. That it
+//! A user's motor, for which a file states nameplate, circuit and dc link: its rules, and the example of the page. That it
 //! works at the first attempt is in `bounds.toml`.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
@@ -156,28 +156,6 @@ fn a_file_with_the_nameplate_alone_is_completed() {
     let run =
         object(&hil_sim(&folder, &["run", "torque-steps", "--motor", "alone.toml", "--json"]));
     assert!(run["remarks"].to_string().contains("alone.toml: circuit and dc link are estimated"));
-}
-
-/// Each message names what was written, and the likely mistake.
-#[test]
-fn wrong_nameplates_are_refused_by_name() {
-    let folder = folder("own-motor-wrong");
-    let lines = include_str!("wrong_plates.txt").lines();
-    let cases: Vec<_> = lines.filter_map(|line| line.split_once(" => ")).skip(1).collect();
-    assert!(cases.len() >= 20);
-    for (plate, parts) in cases {
-        let output = if plate.starts_with('[') {
-            written(&folder, "wrong.toml", &plate.replace(';', "\n"));
-            hil_sim(&folder, &["run", "torque-steps", "--motor", "wrong.toml"])
-        } else {
-            hil_sim(&folder, &["motors", &format!("--plate={plate}")])
-        };
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{plate}: {message}");
-        for part in parts.split(" | ") {
-            assert!(message.contains(part), "{plate}: `{part}` is not in: {message}");
-        }
-    }
 }
 
 /// The page that leads through the first hour states what its commands show.

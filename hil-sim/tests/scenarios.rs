@@ -1,4 +1,4 @@
-//! Scenarios: the files of the program used as files of a user, a user's own scenario, and refusals with file and line.
+//! Scenarios: the files of the program used as files of a user, and a user's own scenario.
 
 use crate::cli_common::{files, folder, hil_sim, object, text};
 use hil_sim::experiments::scenario::QUANTITIES;
@@ -109,60 +109,6 @@ fn a_judge_decides_what_is_lost() {
     assert_eq!(object(&run(10.0))["metrics"]["lost"], 0.0);
     let lost = run(0.1);
     assert_eq!((lost.status.code(), &object(&lost)["metrics"]["lost"]), (Some(1), &1.0.into()));
-}
-
-#[test]
-fn what_is_wrong_is_named_with_file_and_line() {
-    let folder = folder("scenario-wrong");
-    let part = "[[part]]\nseconds = 1\n";
-    let cases = [
-        (
-            format!("{part}speed_rp = 1\n"),
-            "s.toml, line 3: unknown column `speed_rp`; did you mean `speed_rpm`",
-        ),
-        (format!("{part}torque = 1\n"), "allowed: torque_current_a, speed_rpm, position_turns"),
-        (format!("{part}speed_rpm = nan\n"), "line 3: speed_rpm = nan; allowed: a finite number"),
-        (format!("{part}speed_rpm = [0, 1, 2]\n"), "line 3: speed_rpm = [0, 1, 2]; allowed"),
-        (format!("{part}speed_rpm = 1\nload_nm = 1\nload_rpm = 1\n"), "exclude each other"),
-        (
-            format!("{part}speed_rpm = 1\n{part}torque_current_a = 1\n"),
-            "line 6: speed_rpm and torque",
-        ),
-        (format!("{part}load = 1\nload_nm = 1\n"), "load_nm and load exclude each other"),
-        ("[[part]]\nseconds = -1\nspeed_rpm = 1\n".into(), "line 2: seconds = -1; allowed: a time"),
-        ("[[part]]\nspeed_rpm = 1\n".into(), "line 2: a part without `seconds`"),
-        (part.into(), "no [[part]] gives a reference: torque_current_a, speed_rpm"),
-        (
-            format!("{part}speed_rpm = 1\nstop = \"soon\"\n"),
-            "line 4: stop = \"soon\"; allowed: coast",
-        ),
-        (format!("columns = [\"speed\"]\n{part}"), "s.toml, line 1: unknown column `speed`"),
-        (format!("shown = 1\n{part}"), "s.toml, line 1: unknown field `shown`, expected one of"),
-        (
-            format!("[settings]\nmotor.r_x = 1\n{part}"),
-            "s.toml, line 2: there is no key `motor.r_x`",
-        ),
-        ("speed".into(), "s.toml, line 1: "),
-    ];
-    for (scenario, message) in cases {
-        std::fs::write(folder.join("s.toml"), &scenario).unwrap();
-        let output = hil_sim(&folder, &["run", "s.toml"]);
-        let error = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{scenario}: {error}");
-        assert!(error.contains(message), "{scenario}: `{message}` is not in: {error}");
-        assert_eq!(files(&folder).len(), 1, "{scenario}");
-    }
-    let output = hil_sim(&folder, &["run", "none.toml"]);
-    assert!(text(&output.stderr).contains("none.toml: No such file"), "{}", text(&output.stderr));
-}
-
-#[test]
-fn a_name_that_is_gone_is_answered_with_the_command_that_took_its_place() {
-    let folder = folder("scenario-gone");
-    let output = hil_sim(&folder, &["run", "torque-drift"]);
-    let message = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains("`torque-drift` is gone; use `run record"), "{message}");
 }
 
 /// The page has a row for each column.

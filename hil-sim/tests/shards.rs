@@ -4,7 +4,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Command;
 
-use crate::cli_common::{files, folder, hil_sim, object, text};
+use crate::cli_common::{folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
 const SMALL: [(&str, &str); 9] = [
@@ -123,38 +123,6 @@ fn shards_that_do_not_belong_together_are_refused_by_name() {
     std::fs::write(&path, &kept[..kept.len() - 9]).unwrap();
     let output = hil_sim(&folder, &[MONTE_CARLO, &["--json", "--resume", "runs/"]].concat());
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-}
-
-#[test]
-fn options_of_a_part_are_refused_where_they_mean_nothing() {
-    let folder = folder("shards-options");
-    let cases: [(&[&str], &str); 6] = [
-        (
-            &["run", "torque-steps", "--shard", "1/2"],
-            "torque-steps does not consist of independent runs; those that do: ",
-        ),
-        (
-            &["run", "speed-profile", "--resume", "x"],
-            "those that do: monte-carlo, machines, commission, commission-refusals, battery",
-        ),
-        (&["run", "identify", "--shard", "1/2"], "does not consist of independent runs"),
-        (
-            &["run", "monte-carlo", "--shard", "3/2"],
-            "allowed: I/N with N from 1 to 100000 and I from 1 to N",
-        ),
-        (
-            &["run", "monte-carlo", "--shard", "1/2", "--out", "page"],
-            "'--shard <I/N>' cannot be used with '--out <DIR>'",
-        ),
-        (&["run", "monte-carlo", "--shard", "1/2", "--json"], "cannot be used with '--json'"),
-    ];
-    for (arguments, part) in cases {
-        let output = hil_sim(&folder, arguments);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-        assert!(message.contains(part), "{arguments:?}: {message}");
-    }
-    assert!(files(&folder).is_empty(), "{:?}", files(&folder));
 }
 
 /// The records of the file count: a changed record appears in the outcome, so its run was not done again; a torn one is.

@@ -3,58 +3,40 @@
 
 use crate::cli_common::{files, folder, hil_sim, text};
 
-/// Files of the tests: name and text.
-const FILES: [(&str, &str); 20] = [
-    ("type.toml", "[motor]\nr_s = \"five\"\n"),
-    ("range.toml", "[inverter]\n\ndc_link_v = 5000\n"),
-    ("key.toml", "[motor]\nr_s = 5\nrs_ = 5\n"),
-    ("word.toml", "[load]\nmode = \"free-wheeling\"\n"),
-    ("broken.toml", "[motor\n"),
-    ("twice.toml", "seconds = 1\nseconds = 2\n"),
-    ("array.toml", "[motor]\nr_s = [1, 2]\n"),
-    ("motor.toml", "title = \"x\"\n"),
-    ("number.json", "7\n"),
-    ("unit.csv", "time_s,torque\n0,1\n1,1\n"),
-    ("both.csv", "time_s,torque_current_a,speed_rpm\n0,1,1\n1,1,1\n"),
-    ("back.csv", "time_s,speed_rpm\n0,1\n2,1\n1,1\n"),
-    ("text.csv", "time_s,speed_rpm\n0,1\n1,fast\n"),
-    ("short.csv", "time_s,speed_rpm\n0,1\n1\n"),
-    ("loads.csv", "time_s,speed_rpm,load_nm,load_rpm\n0,1,1,1\n1,1,1,1\n"),
-    ("late.csv", "time_s,position_turns\n0.5,1\n1,1\n"),
-    ("none.csv", "time_s,load_nm\n0,1\n1,1\n"),
-    ("ms.csv", "time_s,speed_rpm\n0,1\n10000,1\n"),
-    ("huge.csv", "time_s,speed_rpm\n0,1\n1e300,1\n"),
-    (
-        "long.toml",
-        "[[part]]\nseconds = 2000\nspeed_rpm = 1\n[[part]]\nseconds = 2000\nspeed_rpm = 1\n",
-    ),
-];
+/// Splits a line into arguments; those in single quotes may have spaces.
+fn arguments(line: &str) -> Vec<&str> {
+    let mut all = Vec::new();
+    for (n, part) in line.split('\'').enumerate() {
+        if n % 2 == 1 { all.push(part) } else { all.extend(part.split_whitespace()) }
+    }
+    all
+}
 
 #[test]
 fn each_message_names_the_thing_the_value_and_what_is_allowed() {
     let folder = folder("wrong-input");
-    for (name, contents) in FILES {
-        std::fs::write(folder.join(name), contents).unwrap();
-    }
     std::fs::create_dir(folder.join("runs")).unwrap();
     // A device file has no end.
     for name in ["zero.toml", "zero.json", "runs/zero.jsonl"] {
         std::os::unix::fs::symlink("/dev/zero", folder.join(name)).unwrap();
     }
-    let written = files(&folder);
     let lines = include_str!("wrong_input.txt").lines();
     for case in lines.filter(|line| !line.is_empty() && !line.starts_with('#')) {
         let (line, parts) = case.split_once(" => ").expect("ARGUMENTS => PARTS");
-        let arguments: Vec<&str> = line.split(' ').collect();
-        let output = hil_sim(&folder, &arguments);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{line}: {message}");
-        for part in parts.split(" | ") {
-            assert!(message.contains(part), "{line}: `{part}` is not in: {message}");
+        let (line, file) = line.split_once(" < ").unwrap_or((line, ""));
+        if let Some((name, text)) = file.split_once(": ") {
+            std::fs::write(folder.join(name), text.replace(';', "\n") + "\n").unwrap();
         }
-        assert!(output.stdout.is_empty(), "{line} prints a result");
-        assert!(!message.contains("hil-sim "), "{line}: the user typed cargo sim: {message}");
-        assert_eq!(files(&folder), written, "{line} leaves files");
+        let written = files(&folder);
+        let output = hil_sim(&folder, &arguments(line));
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{case}: {message}");
+        for part in parts.split(" | ") {
+            assert!(message.contains(part), "{case}: `{part}` is not in: {message}");
+        }
+        assert!(output.stdout.is_empty(), "{case} prints a result");
+        assert!(!message.contains("hil-sim "), "{case}: the user typed cargo sim: {message}");
+        assert_eq!(files(&folder), written, "{case} leaves files");
     }
 }
 
