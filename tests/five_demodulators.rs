@@ -8,7 +8,7 @@ use drive_settings::{Settings, SettingsError};
 use hil_sim::config::plant_settings;
 use hil_sim::config::{Config, LoadMode};
 use hil_sim::experiments::learning;
-use hil_sim::plant::{Load, PlantSettings};
+use hil_sim::plant::PlantSettings;
 use hil_sim::rig::Rig;
 
 /// Name, and the ratio of its signal to the rectified chain's, by the gains of the filters and of the detector.
@@ -102,11 +102,7 @@ fn held(config: &Config) -> PlantSettings {
 
 /// The dynamometer takes the shaft to a speed in 0.25 s.
 fn bring_to(rig: &mut Rig, rpm: f64) {
-    for n in 1..=25 {
-        let speed = rpm / 60.0 * std::f64::consts::TAU * f64::from(n) / 25.0;
-        rig.set_load(Load::Speed { speed }).unwrap();
-        rig.wait(0.01);
-    }
+    rig.bring_to(rpm, 25, 0.01).unwrap();
 }
 
 /// Rms and largest angle error of a second, degrees.

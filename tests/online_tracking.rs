@@ -9,7 +9,6 @@ use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused};
 use drive_settings::Settings;
 use hil_sim::config::plant_settings;
 use hil_sim::experiments::warming_rotor::{WarmingCase, WarmingMoment, run};
-use hil_sim::plant::Load;
 use hil_sim::rig::{RATE_HZ, Rig};
 use rotor_id::online::{NoEstimate, Online, SpeedInput};
 
@@ -100,11 +99,7 @@ fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>
     config.inverter.residual_v = Some(residual);
     let mut rig = Rig::new(&plant_settings(&config), &settings, 3).unwrap();
     rig.start(Mode::Torque).unwrap();
-    for n in 1..=100 {
-        let speed = speed_rpm * TAU / 60.0 * f64::from(n) / 100.0;
-        rig.set_load(Load::Speed { speed }).unwrap();
-        rig.wait(0.01);
-    }
+    rig.bring_to(speed_rpm, 100, 0.01).unwrap();
     let mut online = Online::new(&settings).unwrap();
     let truth = rig.plant.tau_r();
     let error = |tau_r: f32| f64::from(tau_r) / truth - 1.0;

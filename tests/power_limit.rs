@@ -1,7 +1,5 @@
 //! Procedure: dc current and power at their limits, by the current that the plant takes from its dc link.
 
-use std::f64::consts::TAU;
-
 use crate::common::config;
 use drive_core::{Command, Limiting, Mode, State};
 use hil_sim::plant::Load;
@@ -54,16 +52,8 @@ fn watch(rig: &mut Rig, seconds: f64) -> Seen {
 fn driven(changes: &[&str], seed: u64, rpm: f64) -> Rig {
     let mut rig = Rig::from_config(&config(changes), seed).unwrap();
     rig.start(Mode::Torque).unwrap();
-    turn(&mut rig, 0.0, rpm);
+    rig.bring_to(rpm, 1000, 1e-3).unwrap();
     rig
-}
-
-fn turn(rig: &mut Rig, from: f64, to: f64) {
-    for n in 1..=1000 {
-        let rpm = from + (to - from) * f64::from(n) * 1e-3;
-        rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 }).unwrap();
-        rig.wait(1e-3);
-    }
 }
 
 const A: &[&str] = &["load.mode=speed", "sequence.i_d=1.4", "injection.allow_unlearned=yes"];
@@ -123,7 +113,7 @@ fn the_power_is_held_over_all_speeds() {
         for (from, to) in [(0.0, 1700.0), (1700.0, -1700.0)] {
             for step in 0..100 {
                 let at = |n: i32| from + (to - from) * f64::from(n) / 100.0;
-                rig.set_load(Load::Speed { speed: at(step) * TAU / 60.0 }).unwrap();
+                rig.turn(at(step)).unwrap();
                 let seen = watch(&mut rig, 0.06);
                 let watts = (311.0 * seen.least_a, 311.0 * seen.most_a);
                 let case = format!("{i_q} A, {:.0} rpm: {watts:?} W, {:.2} A", at(step), seen.i_q);
@@ -155,7 +145,7 @@ fn at_rest_torque_is_not_reversed() {
         rig.command(&Command::Speed(rpm as f32)).unwrap();
         rig.set_load(Load::Free { torque }).unwrap();
         rig.wait(1.5);
-        let found = rig.plant.mechanical_speed() * 60.0 / TAU;
+        let found = rig.rpm();
         assert!((found - rpm).abs() < 5.0, "{torque} Nm, {rpm} rpm: {found}");
     }
     let least = 1.5 * 5.4 * 1.4 * 1.4;

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Drive, Mode, State, Stop};
+use crate::common::coast;
+use drive_core::{Command, Drive, Mode, State};
 use hil_sim::Config;
 use hil_sim::config::motors::Motor;
 use hil_sim::plant::Load;
@@ -71,32 +72,27 @@ fn restarts(motor: &str, plant: &str, draws: impl Iterator<Item = Draw>) -> Opti
     let mut results = Restarts::default();
     for draw in draws {
         let mut rig = learned.clone();
-        let before = draw.share * rated * TAU / 60.0;
-        rig.set_load(Load::Speed { speed: 0.0 }).unwrap();
+        let before = draw.share * rated;
+        rig.turn(0.0).unwrap();
         if !draw.power_up {
             rig.start(Mode::Torque).unwrap();
         }
         // The drive follows a shaft that is driven.
-        for n in 1..=50 {
-            rig.set_load(Load::Speed { speed: before * f64::from(n) / 50.0 }).unwrap();
-            rig.wait(0.02);
-        }
+        rig.bring_to(before, 50, 0.02).unwrap();
         if !draw.power_up {
             assert_eq!(rig.drive.state(), State::Torque, "{motor} {plant} {draw:?}");
-            rig.command(&Command::Stop(Stop::Coast)).unwrap();
-        }
-        while !rig.drive.is_off() {
-            rig.wait(0.001);
+            coast(&mut rig);
         }
         let inertia = f64::from(config.drive.inertia());
-        rig.set_load(Load::Free { torque: draw.load * before * inertia / draw.coast }).unwrap();
+        rig.set_load(Load::Free { torque: draw.load * before * TAU / 60.0 * inertia / draw.coast })
+            .unwrap();
         rig.wait(draw.coast);
         rig.set_load(Load::Free { torque: 0.0 }).unwrap();
         if draw.power_up {
             rig.drive = Drive::new(fresh);
         }
         let mut coasting = rig.clone();
-        let found = rig.plant.mechanical_speed() * 60.0 / TAU;
+        let found = rig.rpm();
         let rotates = found.abs() > STANDS * rated;
         rig.command(&Command::Start(Mode::Speed)).unwrap();
         let (mut braked, mut least) = (false, 1.0_f64);
@@ -115,7 +111,7 @@ fn restarts(motor: &str, plant: &str, draws: impl Iterator<Item = Draw>) -> Opti
         }
         let _ = rig.command(&Command::Speed(found as f32));
         rig.wait(0.5);
-        let now = rig.plant.mechanical_speed() * found.signum();
+        let now = rig.rpm() * found.signum();
         let runs = rig.drive.state() == State::Speed;
         let slowed = runs && rotates && least < KEEPS;
         if !runs || braked || slowed || (rotates && now < 0.0) {

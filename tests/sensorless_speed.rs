@@ -1,9 +1,7 @@
 //! Procedure: the speed of a free shaft regulated without a position sensor, on the simulated rotor.
 
-use std::f64::consts::TAU;
-
-use crate::common::{config, plant_settings};
-use drive_core::{Command, Mode, State, Stop};
+use crate::common::{coast, config, plant_settings};
+use drive_core::{Command, Mode, State};
 use hil_sim::Config;
 use hil_sim::plant::Load;
 use hil_sim::rig::Rig;
@@ -113,7 +111,7 @@ fn with_the_encoder_the_speed_is_exact() {
     println!("encoder: dip {dip:.1}, then {mean:.3}, {most:.3} rpm; {angle:.2} deg");
     // One count in 10 ms is 0.6 rpm.
     assert!(dip < 30.0 && mean.abs() < 0.1 && most < 1.0 && angle < 1.0);
-    let truth = rig.plant.mechanical_speed() * 60.0 / TAU;
+    let truth = rig.rpm();
     assert!((truth - 600.0).abs() < 1.0, "{truth}");
 }
 
@@ -165,10 +163,7 @@ fn a_start_on_a_turning_shaft_does_not_brake_it() {
     for (seed, rpm) in [(1, 1300.0), (2, -560.0)] {
         let config = Config::load(Some("motulator-2kw2"), None, &settings).unwrap();
         let mut rig = regulating(&config, seed, rpm);
-        rig.command(&Command::Stop(Stop::Coast)).unwrap();
-        while !rig.drive.is_off() {
-            rig.wait(0.01);
-        }
+        coast(&mut rig);
         rig.start(Mode::Speed).unwrap();
         rig.command(&Command::Speed(rpm as f32)).unwrap();
         let mut slowest = f64::INFINITY;

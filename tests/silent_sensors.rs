@@ -2,12 +2,10 @@
 //! flux or 8 ms, whichever is later.
 #![allow(clippy::disallowed_methods)]
 
-use std::f64::consts::TAU;
-
 use drive_core::{Command, Mode, State};
 use hil_sim::Config;
 use hil_sim::experiments::full_range::for_the_range;
-use hil_sim::plant::{Channel, CurrentFault, Load};
+use hil_sim::plant::{Channel, CurrentFault};
 use hil_sim::rig::{RATE_HZ, Rig};
 
 /// Pole pairs of the motor.
@@ -20,11 +18,7 @@ fn at_speed(rpm: f64) -> Rig {
     let config = Config::load(None, None, &["prepare.learn=yes"]).unwrap();
     let mut rig = Rig::from_config(&for_the_range(&config).unwrap(), 5).unwrap();
     rig.start(Mode::Torque).unwrap();
-    for n in 1..=100 {
-        let speed = rpm * TAU / 60.0 * f64::from(n) / 100.0;
-        rig.set_load(Load::Speed { speed }).unwrap();
-        rig.wait(0.01 * (rpm / 1000.0).abs());
-    }
+    rig.bring_to(rpm, 100, 0.01 * (rpm / 1000.0).abs()).unwrap();
     rig.wait(0.3);
     rig
 }

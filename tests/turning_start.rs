@@ -1,12 +1,9 @@
 //! Procedure: flying start at low speed, where the injection gives the angle.
 
-use std::f64::consts::TAU;
-
-use crate::common::angle_error;
-use drive_core::{Command, Fault, Mode, State, Stop};
+use crate::common::{angle_error, coast};
+use drive_core::{Command, Fault, Mode, State};
 use hil_sim::Config;
 use hil_sim::experiments::full_range::for_the_range;
-use hil_sim::plant::Load;
 use hil_sim::rig::Rig;
 
 /// The search for the speed and the build-up of the flux do not change the tracked stator resistance, with and without flux that remains
@@ -18,21 +15,14 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
         let mut config = for_the_range(&Config::default()).unwrap();
         config.prepare.learn = true;
         let mut rig = Rig::from_config(&config, seed).unwrap();
-        rig.set_load(Load::Speed { speed: 0.0 }).unwrap();
+        rig.turn(0.0).unwrap();
         rig.start(Mode::Torque).unwrap();
-        for n in 1..=20 {
-            let speed = rpm * f64::from(n) / 20.0 * TAU / 60.0;
-            rig.set_load(Load::Speed { speed }).unwrap();
-            rig.wait(0.01);
-        }
+        rig.bring_to(rpm, 20, 0.01).unwrap();
         rig.command(&Command::Torque(torque)).unwrap();
         rig.wait(0.5);
         assert_eq!(rig.drive.state(), State::Torque, "{rpm} rpm, {torque} A");
         let before = rig.drive.stator_resistance().unwrap();
-        rig.command(&Command::Stop(Stop::Coast)).unwrap();
-        while rig.drive.state() != State::Off {
-            rig.wait(0.001);
-        }
+        coast(&mut rig);
         let stopped = rig;
         for pause in [0.05, 0.15, 0.25, 0.37, 1.5] {
             let mut rig = stopped.clone();
@@ -66,7 +56,7 @@ fn on_iron_a_start_on_a_turning_shaft_is_not_taken_for_a_lost_lock() {
         config = for_the_range(&config).unwrap();
         config.prepare.learn = true;
         let mut rig = Rig::from_config(&config, seed).unwrap();
-        rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 }).unwrap();
+        rig.turn(rpm).unwrap();
         rig.start(Mode::Torque).unwrap();
         rig.command(&Command::Torque(torque)).unwrap();
         rig.wait(0.5);
@@ -86,7 +76,7 @@ fn a_shaft_that_turns_too_fast_is_refused() {
         let mut config = for_the_range(&Config::default()).unwrap();
         config.prepare.learn = true;
         let mut rig = Rig::from_config(&config, seed).unwrap();
-        rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 }).unwrap();
+        rig.turn(rpm).unwrap();
         let state = match rig.start(Mode::Torque) {
             Ok(()) => rig.drive.state(),
             Err(error) => {

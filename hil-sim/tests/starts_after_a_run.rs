@@ -1,7 +1,5 @@
 //! Flying starts after a run that ended without a known speed: residual flux is present, and must not be short-circuited.
 
-use std::f64::consts::TAU;
-
 use drive_core::{Command, Mode, State, Stop};
 use hil_sim::Config;
 use hil_sim::experiments::full_range::for_the_range;
@@ -18,10 +16,6 @@ fn learned(motor: Option<&str>) -> (Rig, f64) {
     let config = Config::load(motor, None, &["prepare.learn=yes"]).expect("settings");
     let config = for_the_range(&config).expect("settings");
     (Rig::from_config(&config, 5).expect("a bench"), config.drive.trip_a().into())
-}
-
-fn turn(rig: &mut Rig, rpm: f64) {
-    rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 }).expect("a load");
 }
 
 /// Starts in torque mode; returns the largest current, A, and whether the low sides have short-circuited the motor.
@@ -62,10 +56,7 @@ fn a_start_that_was_stopped_in_its_search_is_repeated() {
     for motor in MOTORS {
         let (mut rig, trip) = learned(motor);
         rig.start(Mode::Torque).expect("a start");
-        for n in 1..=100 {
-            turn(&mut rig, RPM * f64::from(n) / 100.0);
-            rig.wait(0.02);
-        }
+        rig.bring_to(RPM, 100, 0.02).expect("a load");
         rig.settle(&Command::Stop(Stop::Coast), 0.02).expect("a stop");
         start(&mut rig, State::FlyingStart);
         rig.wait(0.015);
@@ -85,9 +76,9 @@ fn a_start_follows_a_run_by_voltage_and_frequency() {
         rig.set_load(Load::Free { torque: 0.0 }).expect("a load");
         rig.start(Mode::VoltsPerHertz).expect("a start");
         rig.settle(&Command::Speed(RPM as f32), 8.0).expect("a speed");
-        let rpm = rig.plant.mechanical_speed() * 60.0 / TAU;
+        let rpm = rig.rpm();
         rig.settle(&Command::Stop(Stop::Coast), 0.02).expect("a stop");
-        turn(&mut rig, rpm);
+        rig.turn(rpm).expect("a load");
         let flux = rig.plant.rotor_flux().norm();
         let (largest, shorted) = start(&mut rig, State::Torque);
         as_expected(motor, flux, largest / trip, shorted);
@@ -129,7 +120,7 @@ fn a_start_on_a_rotating_shaft_finds_a_resistance_that_has_changed() {
     rested.plant.set_resistances(7.0, config.motor.r_r).expect("resistances");
     for rpm in [85.0, -85.0, 40.0, -40.0, 120.0, -120.0, 250.0, -250.0] {
         let mut rig = rested.clone();
-        turn(&mut rig, rpm);
+        rig.turn(rpm).expect("a load");
         start(&mut rig, State::Torque);
         rig.settle(&Command::Torque(2.0), 0.1).expect("a torque");
         let (mut sum, mut count) = (0.0, 0.0);

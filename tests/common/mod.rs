@@ -1,6 +1,6 @@
 //! The bench that the procedures share.
 
-use drive_core::{Command, Mode};
+use drive_core::{Command, Mode, Stop};
 use drive_settings::Settings;
 pub use hil_sim::config::plant_settings;
 use hil_sim::plant::PlantSettings;
@@ -50,6 +50,14 @@ pub fn beside_encoder(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig 
 pub fn angle_error(rig: &mut Rig, seconds: f64) -> Stats {
     let [error] = rig.stats(seconds, |p| [p.angle_error_deg]);
     error
+}
+
+/// Stops the drive without braking, and waits until its outputs are off.
+pub fn coast(rig: &mut Rig) {
+    rig.command(&Command::Stop(Stop::Coast)).unwrap();
+    while !rig.drive.is_off() {
+        rig.wait(0.001);
+    }
 }
 
 /// A drive that regulates torque, from settings.

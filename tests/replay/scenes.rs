@@ -1,6 +1,5 @@
 //! The recorded scenes: the simulated bench, and the requests and events of each scene, which are in `scenes.txt`.
 
-use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::sync::LazyLock;
 
@@ -101,7 +100,7 @@ impl Bench {
                 self.rig.set_load(Load::Free { torque: number(torque) }).unwrap();
             }
             ["shaft", rpm] => {
-                self.rig.set_load(Load::Speed { speed: number(rpm) * TAU / 60.0 }).unwrap();
+                self.rig.turn(number(rpm)).unwrap();
             }
             [seconds, "s"] => self.run(number(seconds)),
             ["until", state] => self.until(state),

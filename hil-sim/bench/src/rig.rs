@@ -287,6 +287,32 @@ impl Rig {
         self.drive.state().fault().map(fault_text)
     }
 
+    /// Returns the speed of the shaft, rpm.
+    pub fn rpm(&self) -> f64 {
+        self.plant.mechanical_speed() * 60.0 / TAU
+    }
+
+    /// Couples a dynamometer that holds a speed, rpm.
+    ///
+    /// # Errors
+    /// If the speed is out of range.
+    pub fn turn(&mut self, rpm: f64) -> Result<(), Error> {
+        self.set_load(Load::Speed { speed: rpm * TAU / 60.0 })
+    }
+
+    /// Brings the shaft from rest to a speed, rpm, with a dynamometer, in equal steps of `pace_s`.
+    ///
+    /// # Errors
+    /// As [`Rig::turn`].
+    pub fn bring_to(&mut self, rpm: f64, steps: u32, pace_s: f64) -> Result<(), Error> {
+        for n in 1..=steps {
+            let speed = rpm * TAU / 60.0 * f64::from(n) / f64::from(steps);
+            self.set_load(Load::Speed { speed })?;
+            self.wait(pace_s);
+        }
+        Ok(())
+    }
+
     /// Connects another load.
     ///
     /// # Errors

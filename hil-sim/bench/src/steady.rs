@@ -75,11 +75,7 @@ pub fn prepared(config: &Config, seed: u64) -> Result<Rig, Error> {
 pub fn bring_up(rig: &mut Rig, rpm: f64) -> Result<(), Error> {
     rig.start(Mode::Torque)?;
     let steps = (rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
-    for n in 1..=steps {
-        let speed = rpm * TAU / 60.0 * f64::from(n) / f64::from(steps);
-        rig.set_load(Load::Speed { speed })?;
-        rig.wait(0.01);
-    }
+    rig.bring_to(rpm, steps, 0.01)?;
     rig.wait(0.3);
     Ok(())
 }

@@ -118,7 +118,7 @@ impl Case {
         }
         let (wanted, band) = (self.speed * rated_rpm, RECOVERED * rated_rpm);
         rig.command(&Command::Speed(wanted as f32))?;
-        let runs_up = |rig: &Rig| (turning_rpm(rig) - wanted).abs() > band && rig.fault().is_none();
+        let runs_up = |rig: &Rig| (rig.rpm() - wanted).abs() > band && rig.fault().is_none();
         while runs_up(&rig) && rig.time() < RUN_UP_S {
             rig.wait(0.1);
         }
@@ -184,10 +184,6 @@ impl Mean {
 
 fn rated_rpm(config: &Config) -> f64 {
     f64::from(config.drive.nameplate.speed_rpm)
-}
-
-fn turning_rpm(rig: &Rig) -> f64 {
-    rig.plant.mechanical_speed() * 60.0 / TAU
 }
 
 fn steps(seconds: f64) -> usize {

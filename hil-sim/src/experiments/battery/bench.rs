@@ -165,7 +165,7 @@ impl<'a> Bench<'a> {
             trace.push(Moment {
                 t,
                 error_deg: if regulates { self.error_deg } else { f64::NAN },
-                rpm: plant.mechanical_speed() * 60.0 / TAU,
+                rpm: self.rig.rpm(),
                 torque: plant.torque(),
                 current: plant.current().norm(),
                 flux: plant.rotor_flux(),
@@ -263,7 +263,7 @@ impl<'a> Bench<'a> {
             }
             Change::Mains(volts) => plant.set_mains(volts),
             Change::Shaft(rpm) => {
-                plant.set_load(Load::Speed { speed: config.rpm(rpm.after(n, steps)) * TAU / 60.0 })
+                return self.rig.turn(config.rpm(rpm.after(n, steps)));
             }
             Change::DcLink(share) => {
                 plant.set_dc_link(config.inverter.dc_link_v * share.after(n, steps))

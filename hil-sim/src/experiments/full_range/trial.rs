@@ -187,8 +187,7 @@ impl<'a> Run<'a> {
     /// Starts while a dynamometer turns the shaft, then commands torque.
     fn turning_start(&mut self) -> Result<(), Error> {
         let bench = &mut self.bench;
-        let speed = bench.config.rpm(self.rpm) * TAU / 60.0;
-        bench.rig.set_load(Load::Speed { speed })?;
+        bench.rig.turn(bench.config.rpm(self.rpm))?;
         let from = bench.time();
         bench.trial.peak_a = 0.0;
         bench.start();

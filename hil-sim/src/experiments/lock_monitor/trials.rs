@@ -186,7 +186,7 @@ pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<Trial, Error
     let (mut rpm, mut late_s) = (case.rpm.abs(), 0.0);
     while rig.fault().is_none() && late_s < OVER_SPEED_S {
         rpm += rpm_per_s * 0.001;
-        rig.set_load(Load::Speed { speed: rpm.copysign(case.rpm) * TAU / 60.0 })?;
+        rig.turn(rpm.copysign(case.rpm))?;
         rig.wait(0.001);
         late_s = (rpm - limit) / rpm_per_s;
     }
