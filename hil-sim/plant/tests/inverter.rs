@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::bridge::{PERIOD, plant, settings, voltage};
+use crate::common::{T, behind, compare, plant};
 use crate::duties::{TOP, duties};
 use drive_core::Compare;
 use motor_plant::{Complex, InverterSettings, Load, PlantSettings, clarke, phases};
@@ -11,10 +11,10 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Runs 0.2 s with these duty cycles; returns the current, and the voltage of the last period.
 fn settled(inverter: InverterSettings, d: [f64; 3]) -> (Complex, Complex) {
-    let mut plant = plant(&settings(inverter));
+    let mut plant = plant(&behind(inverter));
     let compare = duties(d);
     for _ in 0..1200 {
-        plant.advance(&compare, PERIOD);
+        plant.advance(&compare, T);
     }
     (plant.current(), plant.applied_voltage())
 }
@@ -56,13 +56,13 @@ fn short_pulses_and_gaps_vanish() {
             ([0.997, 0.996, 0.995], [0.997 - 0.0132, 1.0, 1.0]),
         ] {
             let inverter = InverterSettings { switched, residual_v: 0.0, ..Default::default() };
-            let mut plant = plant(&settings(inverter));
+            let mut plant = plant(&behind(inverter));
             for _ in 0..1200 {
-                plant.advance(&duties([0.56, 0.48, 0.46]), PERIOD);
+                plant.advance(&duties([0.56, 0.48, 0.46]), T);
             }
             // Two periods, because the first still contains the delayed part of the previous period.
-            plant.advance(&duties(d), PERIOD);
-            plant.advance(&duties(d), PERIOD);
+            plant.advance(&duties(d), T);
+            plant.advance(&duties(d), T);
             let error = plant.applied_voltage() - clarke(expected.map(|d| 311.0 * d));
             // Compare values are whole numbers: 22 mV.
             assert!(error.norm() < 0.03, "switched {switched}, {d:?}: off by {error} V");
@@ -87,8 +87,8 @@ fn the_dead_time_takes_4_1_volts() {
         // Legs that do not switch have no error.
         let d = [1.0, 0.0, 0.0];
         let short = |s: InverterSettings| {
-            let mut plant = plant(&settings(InverterSettings { switched, vdc: 20.0, ..s }));
-            (0..600).for_each(|_| plant.advance(&duties(d), PERIOD));
+            let mut plant = plant(&behind(InverterSettings { switched, vdc: 20.0, ..s }));
+            (0..600).for_each(|_| plant.advance(&duties(d), T));
             plant.applied_voltage()
         };
         assert!((short(with) - Complex::new(20.0 * 2.0 / 3.0, 0.0)).norm() < 1e-9);
@@ -101,9 +101,9 @@ fn the_delay_shifts_the_voltage() {
     for switched in [false, true] {
         let ideal = InverterSettings { switched, ..InverterSettings::IDEAL };
         let delayed = InverterSettings { propagation_us: 2.2, ..ideal };
-        let mut plant = plant(&settings(delayed));
-        plant.advance(&Compare::LOW_SIDES_ON, PERIOD);
-        plant.advance(&duties([0.6, 0.5, 0.5]), PERIOD);
+        let mut plant = plant(&behind(delayed));
+        plant.advance(&Compare::LOW_SIDES_ON, T);
+        plant.advance(&duties([0.6, 0.5, 0.5]), T);
         let v = plant.applied_voltage().re;
         let full = 311.0 * 0.1 * 2.0 / 3.0;
         // With switching edges the pulses lie well inside the period and only shift; averaged, 1.32 % moves to the next period.
@@ -119,12 +119,12 @@ fn worst_difference(one: &PlantSettings, other: &PlantSettings) -> f64 {
     let (mut one, mut other) = (plant(one), plant(other));
     let mut worst = 0f64;
     for k in 0..6000 {
-        let t = f64::from(k) * PERIOD;
+        let t = f64::from(k) * T;
         let v = Complex::from_polar(25.0, TAU * 8.0 * t)
             + Complex::from_polar(50.0 * (TAU * 600.0 * t).cos(), TAU * 8.0 * t);
-        let compare = voltage(v);
-        one.advance(&compare, PERIOD);
-        other.advance(&compare, PERIOD);
+        let compare = compare(v);
+        one.advance(&compare, T);
+        other.advance(&compare, T);
         worst = worst.max((one.current() - other.current()).norm());
     }
     assert!(one.mechanical_speed().abs() > 1.0, "it turns: {}", one.mechanical_speed());
@@ -133,7 +133,7 @@ fn worst_difference(one: &PlantSettings, other: &PlantSettings) -> f64 {
 
 #[test]
 fn two_substeps_are_enough() {
-    let mut coarse = settings(InverterSettings::default());
+    let mut coarse = behind(InverterSettings::default());
     coarse.mechanics.load = Load::Free { torque: 0.05 };
     let fine = PlantSettings { substeps: 24, ..coarse };
     let worst = worst_difference(&coarse, &fine);
@@ -146,7 +146,7 @@ fn two_substeps_are_enough() {
 
 #[test]
 fn averaged_and_switched_currents_stay_together() {
-    let mut averaged = settings(InverterSettings { residual_v: 0.0, ..Default::default() });
+    let mut averaged = behind(InverterSettings { residual_v: 0.0, ..Default::default() });
     averaged.mechanics.load = Load::Free { torque: 0.05 };
     let mut switched = averaged;
     switched.inverter.switched = true;
@@ -160,7 +160,7 @@ fn averaged_and_switched_currents_stay_together() {
 fn any_sequence_of_commands_keeps_the_state_finite() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
     for switched in [false, true] {
-        let mut s = settings(InverterSettings { switched, ..Default::default() });
+        let mut s = behind(InverterSettings { switched, ..Default::default() });
         s.mechanics.load = Load::Free { torque: 0.0 };
         s.saliency.chi = 1.0;
         let mut plant = plant(&s);
@@ -173,7 +173,7 @@ fn any_sequence_of_commands_keeps_the_state_finite() {
             };
             let (a, b, c) = (compare(), compare(), compare());
             let enabled = rng.random_bool(0.7);
-            plant.advance(&Compare { a, b, c, enabled }, PERIOD);
+            plant.advance(&Compare { a, b, c, enabled }, T);
             assert!(plant.current().norm() < 60.0, "period {k}: {}", plant.current());
             assert!(plant.rotor_flux().is_finite() && plant.mechanical_speed().is_finite());
             if k % 1000 == 0 {

@@ -1,6 +1,5 @@
 //! The tests of the plant: one program, with one module for each subject.
 
-mod bridge;
 mod common;
 mod dc_link;
 mod duties;

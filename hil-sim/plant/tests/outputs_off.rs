@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::bridge::{PERIOD, plant, settings, voltage};
+use crate::common::{T, behind, compare, plant};
 use drive_core::Compare;
 use motor_plant::{
     Complex, InverterSettings, Load, Machine, MachineSettings, MachineState, Mechanics,
@@ -13,13 +13,13 @@ use motor_plant::{
 /// angle by which both rotate in a period, rad.
 fn magnetised(rpm: f64, volts: f64, start: f64) -> (Plant, f64) {
     let speed = rpm * TAU / 60.0;
-    let mut settings = settings(InverterSettings::default());
+    let mut settings = behind(InverterSettings::default());
     settings.mechanics.load = Load::Speed { speed };
     let mut plant = plant(&settings);
-    let turning = 2.0 * speed * PERIOD;
+    let turning = 2.0 * speed * T;
     for k in 0..1800 {
         let angle = start + turning * f64::from(k);
-        plant.advance(&voltage(Complex::from_polar(volts, angle)), PERIOD);
+        plant.advance(&compare(Complex::from_polar(volts, angle)), T);
     }
     (plant, turning)
 }
@@ -34,7 +34,7 @@ fn outputs_off_ends_the_current_and_keeps_it_at_zero() {
             let mut periods = 0;
             while plant.current() != Complex::ZERO {
                 let before = plant.current().norm();
-                plant.advance(&Compare::OFF, PERIOD);
+                plant.advance(&Compare::OFF, T);
                 assert!(plant.current().norm() < before, "{rpm} rpm: the current must fall");
                 periods += 1;
                 // 4 A from 207 V on 52 mH take a millisecond.
@@ -42,7 +42,7 @@ fn outputs_off_ends_the_current_and_keeps_it_at_zero() {
             }
             let (flux, angle) = (plant.rotor_flux().norm(), plant.rotor_flux_angle());
             for _ in 0..600 {
-                plant.advance(&Compare::OFF, PERIOD);
+                plant.advance(&Compare::OFF, T);
                 assert_eq!(plant.current(), Complex::ZERO);
             }
             // psi decays by rr/Lr = 5.37 1/s and rotates with the rotor.
@@ -62,40 +62,40 @@ fn outputs_off_ends_the_current_and_keeps_it_at_zero() {
 
 #[test]
 fn with_the_outputs_off_a_high_emf_charges_the_link_and_a_low_one_does_not() {
-    let mut s = settings(InverterSettings { residual_v: 0.0, ..Default::default() });
+    let mut s = behind(InverterSettings { residual_v: 0.0, ..Default::default() });
     let speed = 1440.0 * TAU / 60.0;
     s.mechanics.load = Load::Speed { speed };
     let mut plant = plant(&s);
     for k in 0..3000 {
-        let angle = 2.0 * speed * PERIOD * f64::from(k);
-        plant.advance(&voltage(Complex::from_polar(40.0, angle)), PERIOD);
+        let angle = 2.0 * speed * T * f64::from(k);
+        plant.advance(&compare(Complex::from_polar(40.0, angle)), T);
     }
     for _ in 0..20 {
-        plant.advance(&Compare::OFF, PERIOD);
+        plant.advance(&Compare::OFF, T);
     }
     assert_eq!(plant.current(), Complex::ZERO);
     // The line-to-line back-EMF is sqrt(3) of its magnitude.
     let emf = plant.applied_voltage().norm() * 3f64.sqrt();
     plant.set_dc_link(1.05 * emf).expect("voltage");
     for _ in 0..20 {
-        plant.advance(&Compare::OFF, PERIOD);
+        plant.advance(&Compare::OFF, T);
         assert_eq!(plant.current(), Complex::ZERO);
     }
     plant.set_dc_link(0.3 * emf).expect("voltage");
     let (mut most, mut charged) = (0f64, 0f64);
     for _ in 0..200 {
-        plant.advance(&Compare::OFF, PERIOD);
+        plant.advance(&Compare::OFF, T);
         let i = plant.current();
         assert!(i.is_finite());
         most = most.max(i.norm());
         // Power into the machine, from the mean voltage of the period and the current at its end.
-        charged -= 1.5 * (i.conj() * plant.applied_voltage()).re * PERIOD;
+        charged -= 1.5 * (i.conj() * plant.applied_voltage()).re * T;
     }
     println!("emf {emf:.1} V line to line: up to {most:.2} A, {charged:.4} J into the link");
     assert!(most > 0.05 && charged > 0.0, "{most} A, {charged} J");
     // The energy comes from the flux, so the flux and the current decay.
     for _ in 0..12_000 {
-        plant.advance(&Compare::OFF, PERIOD);
+        plant.advance(&Compare::OFF, T);
     }
     assert_eq!(plant.current(), Complex::ZERO);
 }
@@ -112,11 +112,11 @@ fn worst_against_soft_diodes(plant: &mut Plant, periods: u32) -> f64 {
     let vdc = plant.dc_link();
     let mut worst = 0f64;
     for _ in 0..periods {
-        plant.advance(&Compare::OFF, PERIOD);
+        plant.advance(&Compare::OFF, T);
         // 311 V/2 mA on 51 mH is a pole at 3e6 rad/s; the Runge-Kutta method is stable up to 2.7 of it per step.
         for _ in 0..400 {
             let legs = phases(reference.state.electrical.i).map(|i| (-i / 1e-3).clamp(-1.0, 1.0));
-            reference.step(clarke(legs) * (0.5 * vdc), PERIOD / 400.0);
+            reference.step(clarke(legs) * (0.5 * vdc), T / 400.0);
         }
         worst = worst.max((plant.current() - reference.state.electrical.i).norm());
     }

@@ -6,6 +6,8 @@ use motor_plant::{
     phases,
 };
 
+use crate::duties::duties;
+
 /// A PWM period, s.
 pub const T: f64 = 1.0 / 6000.0;
 
@@ -21,6 +23,11 @@ pub fn settings() -> PlantSettings {
     settings
 }
 
+/// Settings with the machine of the dissertation, this inverter, ideal sensors, and a locked shaft.
+pub fn behind(inverter: InverterSettings) -> PlantSettings {
+    PlantSettings { iron: None, inverter, ..settings() }
+}
+
 /// The plant with these settings.
 pub fn plant(settings: &PlantSettings) -> Plant {
     Plant::new(settings, 7).expect("plant")
@@ -28,8 +35,7 @@ pub fn plant(settings: &PlantSettings) -> Plant {
 
 /// Duties that give the voltage `v`, V, at 311 V.
 pub fn compare(v: Complex) -> Compare {
-    let [a, b, c] = phases(v).map(|v| ((0.5 + v / 311.0) * 14_167.0).round() as u16);
-    Compare { a, b, c, enabled: true }
+    duties(phases(v).map(|v| 0.5 + v / 311.0))
 }
 
 /// The plant after `seconds` of a constant voltage.
