@@ -25,6 +25,16 @@ pub enum Key {
     After(&'static BenchKey),
 }
 
+/// Evaluates an expression with the row of a key, whichever table it stands in.
+macro_rules! of_row {
+    ($key:expr, $entry:ident => $value:expr) => {
+        match $key {
+            Key::Bench($entry) | Key::After($entry) => $value,
+            Key::Drive($entry) => $value,
+        }
+    };
+}
+
 fn on_bench(name: &str) -> Option<&'static BenchKey> {
     BENCH.iter().find(|key| key.name == name)
 }
@@ -64,10 +74,7 @@ impl Key {
 
     /// Returns the name in the key's own table.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Bench(entry) | Self::After(entry) => entry.name,
-            Self::Drive(entry) => entry.name,
-        }
+        of_row!(self, entry => entry.name)
     }
 
     /// Returns the name under which an assignment sets this key, alone or together with the bench's key of the same name.
@@ -83,19 +90,12 @@ impl Key {
 
     /// Returns the unit, empty for a pure number.
     pub fn unit(self) -> &'static str {
-        match self {
-            Self::Bench(entry) | Self::After(entry) => entry.unit,
-            Self::Drive(entry) => entry.unit,
-        }
+        of_row!(self, entry => entry.unit)
     }
 
     /// Returns the meaning.
     pub fn help(self) -> &'static str {
-        let help = match self {
-            Self::Bench(entry) | Self::After(entry) => entry.help,
-            Self::Drive(entry) => entry.help,
-        };
-        help.trim().trim_end_matches('.')
+        of_row!(self, entry => entry.help).trim().trim_end_matches('.')
     }
 
     /// Returns the range of a number. The drive's values are checked together with its other settings when it is built; the range returned
@@ -111,21 +111,15 @@ impl Key {
 
     /// Returns the words that may be set; none for a number.
     pub fn words(self) -> &'static [&'static str] {
-        match self {
-            Self::Bench(entry) | Self::After(entry) => entry.words(),
-            Self::Drive(entry) => entry.words(),
-        }
+        of_row!(self, entry => entry.words())
     }
 
     /// Returns the allowed values in words, with the unit.
     pub fn allowed_text(self) -> String {
-        let has_rule = match self {
-            Self::Bench(entry) | Self::After(entry) => entry.has_rule(),
-            Self::Drive(entry) => entry.has_rule(),
-        };
         let Some((min, max)) = self.range() else { return self.words().join(", ") };
         let range = format!("{min} to {max} {}", self.unit());
-        format!("{}{}", range.trim_end(), if has_rule { ", or auto" } else { "" })
+        let auto = if of_row!(self, entry => entry.has_rule()) { ", or auto" } else { "" };
+        format!("{}{auto}", range.trim_end())
     }
 
     /// Reads the value.
