@@ -49,5 +49,5 @@ fn no_job_that_builds_has_a_token_that_may_write() {
             }
         }
     }
-    assert_eq!(writes, 1, "the draft of the release");
+    assert_eq!(writes, 3, "the draft of the release, the wheels for PyPI, the pages");
 }

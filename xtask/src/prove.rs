@@ -158,4 +158,35 @@ mod tests {
         assert_eq!(all, (0..10).collect::<Vec<_>>());
         assert!(["0/3", "4/3", "1/0", "3", "a/b"].iter().all(|part| shards(10, part).is_err()));
     }
+
+    #[test]
+    fn a_published_package_has_its_licences_and_the_one_address() {
+        let read = |path: std::path::PathBuf| sources::read(path).unwrap_or_default();
+        let address = "https://github.com/induction-drive/induction-drive";
+        let citation = read("CITATION.cff".into());
+        let version = format!("\nversion: {}\n", env!("CARGO_PKG_VERSION"));
+        assert!(read("Cargo.toml".into()).contains(&format!("repository = \"{address}\"")));
+        assert!(citation.contains(address) && citation.contains(&version));
+        for manifest in sources::files("toml").unwrap() {
+            let folder = manifest.parent().unwrap();
+            let text = read(manifest.clone());
+            if !manifest.ends_with("Cargo.toml") || text.contains("publish = false") {
+                continue;
+            }
+            for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
+                let (own, of_all) = (read(folder.join(name)), read(name.into()));
+                assert!(own == of_all && !own.is_empty(), "{}: {name}", folder.display());
+            }
+            assert!(!read(folder.join("README.md")).is_empty(), "{}: README", folder.display());
+        }
+        for page in sources::files("md").unwrap() {
+            let text = read(page.clone()).replace('\n', " ");
+            for (at, _) in text.match_indices("github.com/induction-drive") {
+                let near: String = text[at..].chars().take(130).collect();
+                let is_ours = text[..at + 32].contains(address)
+                    || near.contains("induction-drive/induction-drive");
+                assert!(is_ours && near.contains("not public yet"), "{}: {near}", page.display());
+            }
+        }
+    }
 }
