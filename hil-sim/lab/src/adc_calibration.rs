@@ -26,7 +26,6 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         }
         let residual = |&(code, current): &(f64, f64)| (code, 1e3 * (fitted.at(code) - current));
         let left: Vec<_> = points.iter().map(residual).collect();
-        let largest = Stats::of(left.iter().map(|point| point.1)).largest();
         let ends = [0.0, LAST_CODE].map(|code| (code, fitted.at(code)));
         readings = readings
             .with(Series::line(format!("line {name}"), ends.to_vec()))
@@ -34,9 +33,6 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         residuals = residuals.with(Series::points(format!("channel {name}"), left));
         let key = name.to_lowercase();
         outcome.metrics.set(format!("slope_{key}_a"), fitted.slope);
-        outcome.metrics.set(format!("intercept_{key}_a"), fitted.intercept);
-        outcome.metrics.set(format!("largest_residual_{key}_a"), 1e-3 * largest);
-        outcome.metrics.set(format!("full_scale_{key}_a"), fitted.at(LAST_CODE));
     }
     let slope = |name: &str| outcome.metrics.get(name).unwrap_or(f64::NAN);
     let mismatch = slope("slope_b_a") / slope("slope_a_a") - 1.0;

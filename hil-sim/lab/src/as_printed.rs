@@ -11,7 +11,7 @@ use crate::prelude::*;
 /// Flux-fixed saliencies of the simulated motors; the source measures none.
 const SALIENCIES: [f64; 3] = [-0.002, -0.0035, -0.035];
 /// Current levels of Figure 38, A.
-const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
+pub(crate) const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
 
 /// Means over the second half of each current level; the run ends if the drive stops itself.
 #[derive(Default)]
@@ -74,6 +74,12 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let ratio = weak.torque.last().zip(weak.torque.first()).map_or(f64::NAN, |(l, f)| l / f);
     outcome.metrics.set("weak_saliency_torque_ratio", ratio);
     texts::add_remarks(&mut outcome, "as-printed", &[]);
+    let of = |quantity, used| beside("Figure 38", quantity).used(used);
+    outcome.compared.extend([
+        of("reference of current, first level", LEVELS_A[0]),
+        of("step of the current from level to level", 1e3 * (LEVELS_A[1] - LEVELS_A[0])),
+        of("reference of current, last level", LEVELS_A[4]),
+    ]);
     position::add(context, &mut outcome)?;
     order::add(&mut outcome)?;
     sources::add(context, &mut outcome)?;

@@ -7,13 +7,13 @@ pub(super) mod tracked;
 use sim_bench::learning;
 use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run};
 
-use crate::injection_map::{self, Curve, Variant};
+use crate::injection_map::take_saliency;
 use crate::prelude::*;
 use demodulation::{DEMODULATIONS, Demodulation, ReferenceKind};
 use signal::{SETTLED_S, SignalQuality, signal_quality};
 use tracked::StepsRun;
 
-/// q-axis currents of the map and of the table, A.
+/// q-axis currents of the table, A.
 const IQ_A: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
 /// q-axis current for the measurement of the delay and for the runs at constant speed, A.
 const DELAY_IQ_A: f64 = 1.0;
@@ -24,8 +24,6 @@ const SPEEDS_RPM: [f64; 2] = [0.0, 150.0];
 /// Results of one demodulation.
 struct DemodulationResults {
     demodulation: Demodulation,
-    /// Curves with saliency and without, by q-axis current.
-    maps: [Vec<Curve>; 2],
     seen: Vec<SignalQuality>,
     isotropic: Vec<SignalQuality>,
     /// Delay, samples; none if the saliency makes no difference.
@@ -38,13 +36,7 @@ impl DemodulationResults {
     fn of(demodulation: Demodulation, context: &Context<'_>) -> Result<Self, Error> {
         let (config, seed) = (context.config, context.seed);
         let mut isotropic = config.clone();
-        injection_map::take_saliency(&mut isotropic);
-        let map = |saliency: bool| {
-            let (demodulator, compensate) = (demodulation.0, !config.drive.ignore_delays);
-            let variant = Variant { demodulator, saliency, compensate, ..injection_map::LITERAL };
-            let curve = |&iq: &f64| injection_map::curve(config, seed, variant, iq);
-            IQ_A.par_iter().map(curve).collect::<Result<Vec<_>, _>>()
-        };
+        take_saliency(&mut isotropic);
         let at_each = |config: &Config| {
             let config = demodulation.config(config);
             let quality = |&iq: &f64| signal_quality(Rig::oriented(&config, seed, iq, SETTLED_S)?);
@@ -61,7 +53,6 @@ impl DemodulationResults {
         let drives = ReferenceKind::VALUES.iter().filter_map(drive);
         let mut found = Self {
             demodulation,
-            maps: [map(true)?, map(false)?],
             seen: at_each(config)?,
             isotropic: at_each(&isotropic)?,
             delay: None,
@@ -105,8 +96,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     outcome.tables.push(seen_table(&found));
     outcome.tables.push(tracked_table(&found));
-    outcome.figures.extend(found.iter().map(map_figure));
-    outcome.figures.push(steps_figure(&found));
     for f in &found {
         let (m, key) = (&mut outcome.metrics, f.demodulation.key());
         let (seen, _) = f.at_one_ampere();
@@ -173,32 +162,4 @@ fn tracked_table(found: &[DemodulationResults]) -> Table {
         }
     }
     table
-}
-
-fn map_figure(f: &DemodulationResults) -> Figure {
-    let demodulation = f.demodulation;
-    let panel = |family: &[Curve], of: &str| {
-        let y = format!("{of} ({})", demodulation.unit());
-        injection_map::panel(y, &IQ_A, family)
-    };
-    let title = format!("{}: over the injection angle", demodulation.name());
-    Figure::new(format!("map_{}", demodulation.key()), title, "Figure 19")
-        .panel(panel(&f.maps[0], "with saliency"))
-        .panel(panel(&f.maps[1], "without"))
-}
-
-fn steps_figure(found: &[DemodulationResults]) -> Figure {
-    let x = "time (s)";
-    let mut panels = [
-        Panel::new(x, "error, constant reference (°)").y_range(-60.0, 60.0),
-        Panel::new(x, "error, learned reference (°)").y_range(-60.0, 60.0),
-        Panel::new(x, "error, learned, retuned (°)").y_range(-20.0, 20.0),
-    ];
-    for f in found {
-        for (kind, t) in &f.tracked {
-            let line = Series::line(f.demodulation.name(), t.steps.error.clone());
-            panels[kind.place()].series.push(line);
-        }
-    }
-    panels.into_iter().fold(texts::figure("demodulators", "steps"), Figure::panel)
 }

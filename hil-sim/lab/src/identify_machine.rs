@@ -1,6 +1,6 @@
 //! Identification of the machine with which the tables of Jacobina, Lima, Ribeiro 1996 were made.
 
-use crate::identification::ratios::{self, Ratio};
+use crate::identification::ratios;
 use crate::identification::{Parameters, claims};
 use crate::prelude::*;
 
@@ -11,11 +11,6 @@ use crate::prelude::*;
 pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let ratios = ratios::all();
-    let largest = |of: fn(&Ratio) -> f64| {
-        ratios.iter().map(|r| (of(r) / r.printed).ln().abs()).fold(0.0, f64::max).exp()
-    };
-    outcome.metrics.set("px_largest_factor", largest(|ratio| ratio.px));
-    outcome.metrics.set("rbv_largest_factor", largest(|ratio| ratio.rbv));
     let table = texts::table("identify-machine", "ratios").records(ratios.iter().map(|ratio| {
         [
             ("quantity", Cell::from(ratio.quantity)),

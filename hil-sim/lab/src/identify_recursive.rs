@@ -4,9 +4,10 @@ use rotor_id::rls::{Rls, RlsSettings};
 
 use crate::identification::recursive::Reference;
 use crate::identification::signals::{Filter, noise};
-use crate::identification::trial::{Noise, VOLTAGE, peaks};
+use crate::identification::trial::{CORNER, Noise, VOLTAGE, peaks};
 use crate::identification::{Complex, Delta, Parameters, Signal, Trial, Value, model_c};
 use crate::prelude::*;
+use crate::recomputed::both;
 
 const H: f64 = 50e-6;
 const RATE: usize = 20_000;
@@ -14,8 +15,6 @@ const RATE: usize = 20_000;
 const CURRENT: f64 = 30.0;
 /// Samples between points of the figures.
 const EVERY: usize = 100;
-/// Noise of the figures: a tenth of the printed noise, as with a real ADC.
-const LEVEL: Noise = Noise { voltage: 0.005, current: 0.02 };
 
 /// Figure, signal, speed (electrical rad/s), convergence times that the paper gives (s).
 const CASES: [(&str, Signal, f64, Option<f64>); 3] = [
@@ -31,7 +30,7 @@ struct Run {
 }
 
 fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run, Error> {
-    let corner = 5.0 * std::f64::consts::TAU * trial.hz;
+    let corner = CORNER * TAU * trial.hz;
     let paper = RlsSettings::paper(VOLTAGE as f32, CURRENT as f32);
     let settings = RlsSettings { corner: (corner * H) as f32, ..paper };
     let mut single = Rls::new(settings)
@@ -86,7 +85,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let trial = Trial::printed(machine, signal, H, Noise::NONE);
         let clean = estimate(&trial, Noise::NONE, seconds, context.seed)?;
         bar.inc(1);
-        let noisy = estimate(&trial, LEVEL, seconds, context.seed)?;
+        let noisy = estimate(&trial, Noise::TENTH, seconds, context.seed)?;
         bar.inc(1);
         let times = [0, 1].map(|k| convergence(&clean.estimates, k));
         slowest[index] = times[0].max(times[1]);
@@ -112,7 +111,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         outcome.figures.push(figure(&key, source, &trial, &noisy.estimates, paper));
         // The ordinates of the paper hold for its own machine.
         let trial = Trial { machine: Parameters::RBV.at(speed), ..trial };
-        let theirs = estimate(&trial, LEVEL, seconds, context.seed)?;
+        let theirs = estimate(&trial, Noise::TENTH, seconds, context.seed)?;
         let key = format!("{key}_table_6");
         outcome.figures.push(figure(&key, source, &trial, &theirs.estimates, paper));
     }
@@ -121,6 +120,17 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         named("slow_converges_later").simulated(slowest[1] > slowest[0]),
     ]);
     outcome.tables.push(table);
+    let paper = RlsSettings::paper(1.0, 1.0);
+    outcome.compared.extend(source::used(
+        "S0",
+        [
+            ("Eq. 44", "omega_n/omega_s", both(CORNER, paper.corner / (TAU * 60.0 * H) as f32)),
+            ("section 6", "h", 1e6 * H),
+            ("section 6", "lambda", paper.lambda.into()),
+        ],
+    ));
+    let covariance = Compared::with("S0", "section 6", "initial covariance over I");
+    outcome.compared.push(covariance.unknown("the units of voltage and current"));
     Ok(outcome)
 }
 

@@ -7,8 +7,6 @@ use crate::identification::{Noise, Parameters, Signal, Trial, model_c};
 use crate::prelude::*;
 
 const H: f64 = 50e-6;
-/// Noise as with a real ADC: a tenth of the noise of section 5.
-const LEVEL: Noise = Noise { voltage: 0.005, current: 0.02 };
 
 /// Returns a printed row of a table.
 fn printed(table: &str, row: &str) -> Parameters {
@@ -26,7 +24,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     for (table, speed) in [("Table 6", SPEEDS[0]), ("Table 7", SPEEDS[1])] {
         let machine = printed(table, "Ss").at(speed);
-        let data = |signal| Trial::printed(machine, signal, H, LEVEL).run(context.seed, 0);
+        let data = |signal| Trial::printed(machine, signal, H, Noise::TENTH).run(context.seed, 0);
         let [by_sg, by_ss] = Signal::ALL.map(|signal| data(signal).regression());
         let (by_sg, by_ss) = (by_sg.map_err(Error::refused)?, by_ss.map_err(Error::refused)?);
         let sg = model_c(&by_sg.delta, H).array();

@@ -35,19 +35,16 @@ pub(super) const LITERAL: Variant =
 const RECTIFIED: Variant =
     Variant { name: "rectified", title: "Rectified, delay compensated, motor with saliency", demodulator: DemodulatorKind::Rectified, compensate: true, ..LITERAL };
 #[rustfmt::skip] // a variant a line
-const VARIANTS: [Variant; 8] = [
+const VARIANTS: [Variant; 5] = [
     LITERAL,
     Variant { name: "literal_isotropic", title: "As printed, motor without saliency", saliency: false, ..LITERAL },
     Variant { name: "literal_silent", title: "As printed, no saliency and no injection", saliency: false, inject: false, ..LITERAL },
     RECTIFIED,
-    Variant { name: "rectified_isotropic", title: "Rectified, delay compensated, motor without saliency", saliency: false, ..RECTIFIED },
-    Variant { name: "rectified_delayed", title: "Rectified, delay left in, motor with saliency", compensate: false, ..RECTIFIED },
-    Variant { name: "rectified_isotropic_delayed", title: "Rectified, delay left in, motor without saliency", saliency: false, compensate: false, ..RECTIFIED },
     Variant { name: "literal_lpf", title: "As printed, with the currents that LPF of Table 7 gives, no saliency", saliency: false, lpf_as_printed: true, ..LITERAL },
 ];
 
 /// delta_i in mA (with the synchronous demodulation: thousandths) over phi2 - theta in degrees.
-pub(super) type Curve = Vec<(f64, f64)>;
+type Curve = Vec<(f64, f64)>;
 
 /// Runs the experiment: Figure 19.
 ///
@@ -73,7 +70,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             outcome.metrics.set(name, at(curve, 90.0));
         }
     }
-    outcome.tables.push(table(&curves, f64::from(context.config.drive.i_d())));
     let isotropic = &curves[IQ_A.len()..2 * IQ_A.len()];
     let silent = &curves[2 * IQ_A.len()..3 * IQ_A.len()];
     let same =
@@ -92,7 +88,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         };
         Stats::of(isotropic[1..].windows(2).map(crossing)).mean()
     };
-    let printed_lpf = curves[7 * IQ_A.len() + 1..].iter();
+    let printed_lpf = curves[4 * IQ_A.len() + 1..].iter();
     let leak = Stats::of(printed_lpf.map(|curve| at(curve, 90.0).abs())).mean();
     outcome.compared.extend([
         named("zero_without_iq").simulated(zero(&isotropic[0])),
@@ -112,7 +108,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 }
 
 /// Draws a family of curves, one for each q-axis current, A.
-pub(super) fn panel(y: impl Into<String>, iq_a: &[f64], family: &[Curve]) -> Panel {
+fn panel(y: impl Into<String>, iq_a: &[f64], family: &[Curve]) -> Panel {
     let line = |(iq, curve): (&f64, &Curve)| Series::line(format!("iq = {iq} A"), curve.clone());
     iq_a.iter().zip(family).map(line).fold(Panel::new("φ̂₂ − θ (° electrical)", y), Panel::with)
 }
@@ -124,7 +120,7 @@ pub(super) fn take_saliency(config: &mut Config) {
 
 /// Sweeps the injection angle with the encoder as angle source and the shaft locked. If the injection belongs along the
 /// flux, theta is counted from 90° ahead of the flux.
-pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve, Error> {
+fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve, Error> {
     let mut config = config.clone();
     config.drive.injection.demodulator = variant.demodulator;
     config.drive.ignore_delays = !variant.compensate;
@@ -162,25 +158,4 @@ fn zero(curve: &Curve) -> f64 {
         .filter(|w| w[0].0 > -100.0 && w[1].0 < 100.0)
         .find(|w| w[0].1.signum() != w[1].1.signum())
         .map_or(f64::NAN, |w| w[0].0 - w[0].1 * (w[1].0 - w[0].0) / (w[1].1 - w[0].1))
-}
-
-/// Makes the table of the printed chain on the motor without saliency beside the predicted leakage, and of the
-/// rectified chain on the motor with saliency.
-fn table(curves: &[Curve], id: f64) -> Table {
-    let mut table = texts::table("injection-map", "shown");
-    for (k, iq) in IQ_A.iter().enumerate() {
-        let seen = |variant: usize, x: f64| at(&curves[variant * IQ_A.len() + k], x);
-        table.record([
-            ("iq (A)", Cell::fixed(*iq, 1)),
-            ("leak predicts at -90° (mA)", Cell::fixed(2f64.sqrt() * 10.0 * PP * id, 3)),
-            ("as printed, isotropic, at -90° (mA)", Cell::fixed(seen(1, -90.0), 3)),
-            ("leak predicts zero at (°)", Cell::fixed(-(iq / id).atan().to_degrees(), 2)),
-            ("zero found at (°)", Cell::fixed(zero(&curves[IQ_A.len() + k]), 2)),
-            ("rectified, saliency, at 90° (mA)", Cell::fixed(seen(3, 90.0), 2)),
-            ("rectified, isotropic, at 90° (mA)", Cell::fixed(seen(4, 90.0), 2)),
-            ("delay left in, saliency, at 90° (mA)", Cell::fixed(seen(5, 90.0), 2)),
-            ("delay left in, isotropic, at 90° (mA)", Cell::fixed(seen(6, 90.0), 2)),
-        ]);
-    }
-    table
 }

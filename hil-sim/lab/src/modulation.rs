@@ -50,7 +50,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     };
     let mut outcome = Outcome::default();
     outcome.figures.push(vectors(&inverter));
-    outcome.figures.push(sequence(&inverter));
+    outcome.figures.push(sequence(&inverter, &mut outcome.compared));
     table_2(&inverter, &mut outcome);
     accuracy(&inverter, &mut outcome);
     carrier::add(context, &mut outcome);
@@ -97,9 +97,11 @@ fn table_2(inverter: &Inverter, outcome: &mut Outcome) {
 }
 
 /// Draws Figure 5 at 20° and half of the largest circle.
-fn sequence(inverter: &Inverter) -> Figure {
+fn sequence(inverter: &Inverter, compared: &mut Vec<Compared>) -> Figure {
     let wanted = vector(0.5 * inverter.vdc / 3.0_f64.sqrt(), 20.0_f64.to_radians());
     let compare = inverter.compare(wanted);
+    let switches = compare.iter().filter(|compare| (1.0..inverter.top).contains(*compare));
+    compared.push(named("transitions").recomputed(2.0 * switches.count() as f64));
     let period_us = 1e6 * f64::from(PERIOD_S);
     let mut panel = Panel::new("time in the PWM period (µs)", "leg high (1) or low (0), offset");
     for (k, (name, compare)) in ["a", "b", "c"].into_iter().zip(compare).enumerate() {

@@ -5,8 +5,9 @@ use drive_core::filter::{LPF, LpfState};
 use drive_settings::tuning::{design_current_loop, motor_plant, rule_3_8};
 
 use crate::identification::arx::{Arx, Orders, fit};
-use crate::identification::signals::Prbs;
+use crate::identification::signals::{self, Prbs};
 use crate::prelude::*;
+use crate::recomputed::plant;
 
 /// Amplitude of the pseudo-random voltage, V: assumed, because the source gives none. It changes the current by about
 /// 0.3 A.
@@ -15,6 +16,8 @@ const PRBS_V: f32 = 30.0;
 const PRBS_PERIODS: usize = 8;
 /// Duration of each level of the steps, s.
 const LEVEL_S: f64 = 0.05;
+/// Samples of a record with a constant part.
+const SAMPLES: usize = 4000;
 /// Samples shown in a figure.
 const SHOWN: usize = 600;
 /// Delays under trial, in samples beyond one.
@@ -89,14 +92,15 @@ const TRIALS: [Trial; 3] = [
 
 /// Pseudo-random voltage on q, at a q-axis current of 2 A.
 fn at_2_a(rig: &mut Rig) -> Result<Record, Error> {
-    rig.settle(&Command::Torque(2.0), 1.0)?;
+    let level = printed("Figure 32", "reference of the quadrature current");
+    rig.settle(&Command::Torque(level as f32), 1.0)?;
     prbs(rig, Axis::Q)
 }
 
 fn steps(rig: &mut Rig) -> Result<Record, Error> {
     let mut record = Record::default();
-    for level in [0.0, 2.0, -2.0, 0.0] {
-        rig.command(&Command::Torque(level))?;
+    for level in source::column("S1", "Figure 22", "reference of the quadrature current") {
+        rig.command(&Command::Torque(level as f32))?;
         for _ in 0..(LEVEL_S * RATE_HZ) as usize {
             record.push(rig, Axis::Q);
         }
@@ -234,6 +238,24 @@ fn figure(trial: &Trial, record: &Record, u: &[f64], found: &IdentifiedPlant) ->
     Figure::new(name, title, trial.figure).panel(voltage).panel(current)
 }
 
+/// Error of the pole of Eq. 3.34 that appendix A finds with 50 mA of noise, if voltage and current keep their means for the last part of
+/// the record. It is infinite if the least squares refuse the record.
+fn with_constant(share: f64, seed: u64) -> f64 {
+    let plant = plant("Eq. 3.34");
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (mut sequence, mut current) = (Prbs::default(), 0.0);
+    let (mut u, mut y) = (Vec::new(), Vec::new());
+    for n in 0..SAMPLES {
+        let is_still = n as f64 >= (1.0 - share) * SAMPLES as f64;
+        let volts = if is_still { 0.0 } else { f64::from(PRBS_V) * sequence.step() };
+        u.push(volts);
+        y.push(current + signals::noise(&mut rng, 0.05).re);
+        current = plant.p * current + plant.k * volts;
+    }
+    let found = fit(&u, &y, Orders { outputs: 1, inputs: 1, delay: 0 });
+    found.map_or(f64::INFINITY, |found| (found.a[0] + plant.p).abs())
+}
+
 /// Adds the remarks, and the verdict of the same least squares on data without excitation.
 fn remark(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     let mut rig = bench(context)?;
@@ -242,9 +264,10 @@ fn remark(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     for _ in 0..500 {
         still.push(&mut rig, Axis::Q);
     }
-    let orders = Orders { outputs: 1, inputs: 1, delay: 0 };
-    let constant = fit(&[10.0; 500], &[1.0; 500], orders);
-    outcome.compared.push(named("constants_degrade").recomputed(constant.is_err()));
+    let errors = [0.0, 0.5, 0.9].map(|share| with_constant(share, context.seed));
+    outcome.compared.push(named("constants_degrade").recomputed(errors.is_sorted_by(|a, b| a < b)));
+    let bits = (Prbs::PERIOD as f64 + 1.0).log2();
+    outcome.compared.push(beside("section 3.10", "bits of the pseudo-random sequence").used(bits));
     let still = still.without_mean();
     let noise = IdentifiedPlant::fit(&still.u, &still.y, 1, 0)?;
     let values = [("condition", noise.condition), ("k", noise.plant.k)];

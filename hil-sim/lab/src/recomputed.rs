@@ -1,8 +1,9 @@
 //! Comparison of this project's constants with those of Barroso 2017, and results that follow from his numbers without a printed formula.
 
 use drive_core::carrier::CARRIER_SAMPLES;
+use drive_core::{Abc, Line};
 use drive_settings::tuning::{bisected, rule_3_8};
-use sim_bench::plant::InverterSettings;
+use sim_bench::plant::{InverterSettings, MeasurementSettings};
 
 use crate::prelude::*;
 
@@ -40,20 +41,30 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
+/// Returns a constant that the program has twice, in plant, bench or laboratory and in the drive; not a number if the two differ.
+pub fn both(plant: f64, drive: f32) -> f64 {
+    if (f64::from(drive) / plant - 1.0).abs() < 1e-6 { plant } else { f64::NAN }
+}
+
 /// Compares the constants of the program with the printed values.
 fn constants(outcome: &mut Outcome) {
     let (drive, config, motor) =
         (Settings::default(), Config::default(), MachineSettings::default());
     let plate = config.drive.nameplate;
-    // The value is the same in the plant, on the bench and in the drive.
-    let both = |plant: f64, drive: f32| if plant as f32 == drive { plant } else { f64::NAN };
     let three = |plant: f64, bench: f64, drive: f32| both(both(plant, bench as f32), drive);
-    let bench = config.motor;
+    let (bench, inverter) = (config.motor, InverterSettings::default());
     let of_plant = both(motor.lls, motor.llr as f32);
     let leakage = three(of_plant, both(bench.l_ls, bench.l_lr as f32), drive.motor.l_ls);
     let pii = drive.injection.printed;
+    let (channels, plant) = ([Line::CHANNEL_A, Line::CHANNEL_B], MeasurementSettings::default());
+    let [d, q] = [drive.identified_d(), drive.identified_q()];
+    let of_a = Abc { a: 1.0, ..Abc::ZERO }.to_alpha_beta().alpha;
+    let of_two = |a, b| f64::from(AlphaBeta::from_two_phases(a, b).beta);
     #[rustfmt::skip] // a constant a line
     let constants = [
+        ("Eq. 2.3", "i_alpha of i_a", of_a.into()),
+        ("Eq. 2.4", "i_beta of i_a", of_two(1.0, 0.0)),
+        ("Eq. 2.4", "i_beta of i_b", of_two(0.0, 1.0)),
         ("Figure 13", "sampling frequency", RATE / 1e3),
         ("section 3.2", "switching frequency of the inverter", RATE / 1e3),
         ("Figure 13", "frequency at which the difference is stated", CARRIER_HZ),
@@ -64,19 +75,27 @@ fn constants(outcome: &mut Outcome) {
         ("Table 3", "rated current, star", plate.current_a.into()),
         ("Table 3", "rated frequency", plate.frequency_hz.into()),
         ("Table 3", "rated speed", plate.speed_rpm.into()),
-        ("Eq. 3.3", "f_c", config.measurement.filter_hz),
+        ("Eq. 3.3", "f_c", both(config.measurement.filter_hz, plant.filter_hz as f32)),
+        ("Eq. 3.5", "slope of I_A", both(plant.lsb_a, channels[0].gain)),
+        ("Eq. 3.5", "offset of I_A", both(-plant.range_a, channels[0].offset)),
+        ("Eq. 3.5", "slope of I_B", channels[1].gain.into()),
+        ("Eq. 3.5", "offset of I_B", channels[1].offset.into()),
+        ("Figure 19", "current difference at which the curves meet, about", 1e3 * f64::from(pii.reference_a)),
         ("section 3.10", "reference of the direct current in all tests", 1e3 * f64::from(config.drive.i_d())),
-        ("Figure 28", "delay from the command to the first switch", InverterSettings::default().propagation_us),
-        ("Figure 28", "further delay to the second switch", 1e6 * f64::from(drive.inverter.dead_time_s)),
+        ("Figure 28", "delay from the command to the first switch", inverter.propagation_us),
+        ("Figure 28", "further delay to the second switch", both(inverter.dead_time_us, 1e6 * drive.inverter.dead_time_s)),
         ("section 3.6.1", "r_s", three(motor.rs, bench.r_s, drive.motor.r_s)),
         ("section 3.6.2", "r_r", three(motor.rr, bench.r_r, drive.motor.r_r)),
         ("section 3.6.2", "L_l1 = L_l2", 1e3 * leakage),
         ("section 3.6.3", "L_m", 1e3 * three(motor.lm, bench.l_m, drive.motor.l_m)),
+        ("Eq. 3.41", "gain", d.k),
+        ("Eq. 3.41", "pole", d.p),
+        ("Eq. 3.42", "gain", q.k),
+        ("Eq. 3.42", "pole", q.p),
         ("Eq. 3.44", "k_s", pii.k_s.into()),
         ("Eq. 3.44", "z_s", pii.z_s.into()),
     ];
-    let ours = |(place, quantity, used)| beside(place, quantity).used(used);
-    outcome.compared.extend(constants.map(ours));
+    outcome.compared.extend(source::used("S1", constants));
 }
 
 /// Analyses Eq. 4.1 with Eq. 4.2: (z - 1)² (z - p) + k_c k (z - z_c).

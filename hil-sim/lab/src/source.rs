@@ -33,6 +33,8 @@ pub enum Kind {
     Graph,
     /// A statement that is true or false; its value is `yes` or `no`.
     Claim,
+    /// A fact about the equipment, from which no other value follows.
+    Bench,
 }
 
 /// A printed value.
@@ -136,7 +138,7 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
                 };
                 let (kind, name) = kind.split_once(' ').unwrap_or((kind, ""));
                 let kind = toml::Value::from(kind).try_into();
-                let kind = kind.expect("input, result, graph or claim");
+                let kind = kind.expect("input, result, graph, claim or bench");
                 let [formula, slip] = [0, 1].map(|k| more.get(k).cloned());
                 let name = name.to_owned();
                 let rest = Printed { kind, name, formula, slip, ..Printed::default() };
@@ -228,6 +230,11 @@ pub fn named(name: &str) -> Compared {
     Compared::with(&found.source, &*found.place, &*found.quantity)
 }
 
+/// Makes entries for the constants that the program uses for printed values: place, quantity, constant.
+pub fn used<const N: usize>(source: &'static str, all: [(&str, &str, f64); N]) -> [Compared; N] {
+    all.map(|(place, quantity, used)| Compared::with(source, place, quantity).used(used))
+}
+
 /// Returns the numbers of a column of a table, starting with the first row.
 pub fn column(source: &str, table: &str, quantity: &str) -> Vec<f64> {
     let begins = format!("{table}, ");
@@ -268,10 +275,10 @@ impl Printed {
         self.number().is_some_and(|printed| (ours - printed).abs() <= bound)
     }
 
-    /// Whether the constant of the program equals the printed value: to its last digit, or to single precision if that has fewer digits.
+    /// Whether the constant of the program equals the printed value to single precision.
     fn is_used(&self, used: f64) -> bool {
-        self.agrees(used, 0.501)
-            || self.number().is_some_and(|printed| (used / printed - 1.0).abs() < SINGLE)
+        let bound = |printed: f64| if printed == 0.0 { SINGLE } else { SINGLE * printed.abs() };
+        self.number().is_some_and(|printed| (used - printed).abs() < bound(printed))
     }
 
     /// Returns one unit of the last printed digit. For a whole number it is 1, regardless of trailing zeros.
@@ -338,6 +345,7 @@ pub fn verdict(place: usize, ours: &Compared) -> Verdict {
         (Some(worst), ..) => worst,
         (None, Some(_), _) => Class::Equal.named(),
         (None, None, Some(what)) => unknown(what),
+        _ if printed.kind == Kind::Bench => (Class::Input, "equipment".to_owned()),
         _ if is_input && printed.taken.load(Ordering::Relaxed) => Class::Input.named(),
         _ => Class::None.named(),
     }

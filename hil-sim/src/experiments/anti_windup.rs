@@ -2,7 +2,7 @@
 
 use drive_core::current::{Pi, PiState};
 
-use sim_lab::source::named;
+use sim_lab::source::{beside, named};
 
 use super::poles::largest_pole;
 use crate::prelude::*;
@@ -137,6 +137,12 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
 /// Adds the statements of appendix B about Figure 40.
 fn compared(outcome: &mut Outcome) {
     let plain = Response::of(without(), LIMIT);
+    let of = |quantity, used| beside("Figure 40", quantity).used(used);
+    outcome.compared.extend([
+        of("K_c", K_C),
+        of("z_c", Z_C),
+        of("limit of the control effort", LIMIT),
+    ]);
     let late = Response::of(literal(LIMIT), LIMIT).y.split_off(SAMPLES - 40);
     let swing = highest(&late) - late.iter().copied().fold(f64::INFINITY, f64::min);
     outcome.metrics.set("printed_anti_windup_swing", swing);

@@ -2,10 +2,10 @@
 
 use drive_core::carrier::CARRIER_SAMPLES;
 
+use crate::as_printed::LEVELS_A;
 use crate::prelude::*;
 
-/// Current levels of Figure 38, A, and the time at each, s.
-const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
+/// Time at each level of Figure 38, s.
 const LEVEL_S: f64 = 0.6;
 /// Time after the first level that is not judged, s: the angle settles from the magnetising position.
 const SETTLING_S: f64 = 0.5;
@@ -13,8 +13,6 @@ const SETTLING_S: f64 = 0.5;
 /// A run through the torque steps.
 #[derive(Clone, Debug)]
 pub struct StepsRun {
-    /// Angle error, degrees, over time, s: means over an injection period.
-    pub error: Vec<(f64, f64)>,
     /// Angle error after settling, degrees.
     pub stats: Stats,
     /// Whether the error exceeded 45°, or the drive stopped itself.
@@ -30,7 +28,7 @@ pub fn steps(config: &Config, seed: u64) -> Result<StepsRun, Error> {
     config.load.mode = LoadMode::Locked;
     let mut rig = Rig::started(&config, seed, Mode::Torque)?;
     let start = rig.time();
-    let (mut error, mut stats) = (Vec::new(), Stats::default());
+    let mut stats = Stats::default();
     for iq in LEVELS_A.map(|iq| config.amperes(iq)) {
         if rig.drive.state().fault().is_some() {
             break;
@@ -38,16 +36,13 @@ pub fn steps(config: &Config, seed: u64) -> Result<StepsRun, Error> {
         rig.command(&Command::Torque(iq as f32))?;
         for _ in 0..(LEVEL_S * RATE_HZ) as usize / CARRIER_SAMPLES {
             let t = rig.time() - start;
-            let mut mean = Stats::default();
             rig.run(CARRIER_SAMPLES as f64 / RATE_HZ, |p| {
-                mean.push(p.angle_error_deg);
                 if t >= SETTLING_S {
                     stats.push(p.angle_error_deg);
                 }
             });
-            error.push((t, mean.mean()));
         }
     }
     let lost = stats.largest() > LOST_DEG || rig.drive.state().fault().is_some();
-    Ok(StepsRun { error, stats, lost })
+    Ok(StepsRun { stats, lost })
 }

@@ -27,23 +27,6 @@ impl ComparedFilter {
         direct::response(&self.printed, omega_t)
     }
 
-    /// Frequency response from Tables 7 and 8, with coefficients rounded to `f32`.
-    pub fn direct_rounded(&self, omega_t: f64) -> Complex64 {
-        direct::response(&direct::rounded(&self.printed), omega_t)
-    }
-
-    /// Magnitude of the largest pole of the direct form, as printed and rounded to `f32`.
-    pub fn largest_poles(&self) -> [f64; 2] {
-        let [_, rounded] = direct::rounded(&self.printed);
-        [&self.printed[1], &rounded].map(|a| largest_pole(&a[1..]))
-    }
-
-    /// Group delay in samples.
-    pub fn group_delay(&self, omega_t: f64) -> f64 {
-        let h = 1e-5;
-        -(self.sections(omega_t + h) / self.sections(omega_t - h)).arg() / (2.0 * h)
-    }
-
     /// Measures errors against `f64`, A: for each form its name, its name in the metrics and statistics.
     pub fn errors(&self, input: &mut dyn FnMut() -> f64, samples: u64) -> Vec<FormErrors> {
         let mut forms: Vec<Form> =

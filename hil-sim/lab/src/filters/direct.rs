@@ -7,11 +7,6 @@ pub fn printed(table: &str, filter: &str) -> [Vec<f64>; 2] {
     ["b", "a"].map(|part| source::column("S1", table, &format!("{part} ({filter})")))
 }
 
-/// Rounds each coefficient to `f32`.
-pub fn rounded(filter: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
-    filter.each_ref().map(|part| part.iter().map(|&c| f64::from(c as f32)).collect())
-}
-
 /// Evaluates a polynomial in z⁻¹ at an angle in rad/sample.
 pub fn value(part: &[f64], omega_t: f64) -> Complex64 {
     let delay = Complex64::cis(-omega_t);

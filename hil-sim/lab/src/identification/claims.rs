@@ -1,8 +1,10 @@
 //! The claims of section 5 about Tables 1 to 5, counted in the tables themselves and in ours.
 
 use super::printed::{Case, PERIODS, SPEEDS, error};
+use super::signals::{TONE_AMPLITUDE, TONES};
 use super::study::{Entry, TRIALS, errors};
-use super::{CurrentVoltage, Noise, Parameters, Signal, model_c};
+use super::trial::{FINE, ORDER};
+use super::{CurrentVoltage, Noise, Parameters, Signal, Trial, model_c};
 use crate::prelude::*;
 
 /// A row of the tables: model, speed, parameter.
@@ -48,6 +50,7 @@ pub fn add(seed: u64, compared: &mut Vec<Compared>, metrics: &mut Metrics) {
     for (name, value) in numbers {
         metrics.set(name, value);
     }
+    compared.extend(settings());
     // Eq. 42 and Model C on the exact coefficients.
     for (h, micros) in PERIODS.iter().zip([50, 100, 200]) {
         let low_by = |machine: Parameters, k: usize| {
@@ -59,6 +62,32 @@ pub fn add(seed: u64, compared: &mut Vec<Compared>, metrics: &mut Metrics) {
         let bias = low_by(Parameters::RBV, 1).abs();
         metrics.set(format!("model_c_tau_r_bias_of_rbv_at_{micros}_us_pct"), bias);
     }
+}
+
+/// Compares the settings of the simulated measurements with the printed ones.
+fn settings() -> [Compared; 15] {
+    let [fast, slow] = SPEEDS.map(|speed| {
+        Trial::printed(Parameters::PX.at(speed), Signal::SixStep, PERIODS[0], Noise::PRINTED)
+    });
+    #[rustfmt::skip] // a setting a line
+    let settings = [
+        ("section 4", "K, tones of the Schroeder signal", TONES.into()),
+        ("section 4", "amplitude of a tone, share of max(S_g)", TONE_AMPLITUDE),
+        ("section 5", "step of the simulation", 1e6 * FINE),
+        ("section 5", "order of the series", ORDER.into()),
+        ("section 5", "r_v", fast.noise.voltage),
+        ("section 5", "r_i", fast.noise.current),
+        ("section 5", "N, samples of a measurement", fast.samples as f64),
+        ("section 5", "M, measurements", TRIALS as f64),
+        ("section 5", "h_1", 1e6 * PERIODS[0]),
+        ("section 5", "h_2", 1e6 * PERIODS[1]),
+        ("section 5", "h_3", 1e6 * PERIODS[2]),
+        ("Tables 1 to 3", "f_s", fast.hz),
+        ("Tables 1 to 3", "speed", fast.machine.omega_m),
+        ("Tables 4 and 5", "f_s", slow.hz),
+        ("Tables 4 and 5", "speed", slow.machine.omega_m),
+    ];
+    source::used("S0", settings)
 }
 
 fn found(of: Errors<'_>) -> Found {

@@ -7,9 +7,9 @@ use rand::{Rng, RngExt};
 use super::Complex;
 
 /// Tones of the Schroeder signal.
-const TONES: u32 = 5;
+pub const TONES: u32 = 5;
 /// Amplitude of a tone divided by that of the six-step voltage: sqrt(p_k / 2) = 0.2 max(S_g).
-const TONE_AMPLITUDE: f64 = 0.2;
+pub const TONE_AMPLITUDE: f64 = 0.2;
 
 /// Six-step voltage S_g at `t` s: a vector of `amplitude` V that jumps by 60° six times per period of the fundamental
 /// of `hz`.

@@ -7,11 +7,13 @@ use super::{Complex, Data, Parameters};
 use crate::prelude::*;
 
 /// Simulation step of the paper, s.
-const FINE: f64 = 5e-6;
+pub const FINE: f64 = 5e-6;
 /// Order of the series in the paper.
-const ORDER: u32 = 5;
+pub const ORDER: u32 = 5;
 /// Amplitude of the six-step voltage, V. The errors in % do not depend on it.
 pub const VOLTAGE: f64 = 180.0;
+/// Corner of the filters divided by the frequency of the supply, omega_n/omega_s.
+pub const CORNER: f64 = 5.0;
 /// Time that the machine runs before recording starts, s.
 const WARM_UP: f64 = 1.0;
 /// Samples that pass the filters before the first one is used.
@@ -61,6 +63,8 @@ impl Noise {
     pub const NONE: Self = Self { voltage: 0.0, current: 0.0 };
     /// r_v and r_i as section 5 prints them: up to 5 % and 20 % in either direction.
     pub const PRINTED: Self = Self { voltage: 0.05, current: 0.2 };
+    /// Noise as with a real ADC: a tenth of the printed noise.
+    pub const TENTH: Self = Self { voltage: 0.005, current: 0.02 };
     /// r_v and r_i read as peak to peak. The results are closer to Tables 1 to 3, but this contradicts the words of the
     /// paper; it was chosen by comparison with those same tables.
     pub const HALF: Self = Self { voltage: 0.025, current: 0.1 };
@@ -120,7 +124,7 @@ impl Trial {
         let (largest_v, largest_i) = (self.noise.voltage * peak_v, self.noise.current * peak_i);
         let mut rng =
             Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(0x9E37_79B9).wrapping_add(m));
-        let filter = Filter::new(5.0 * TAU * self.hz, self.h);
+        let filter = Filter::new(CORNER * TAU * self.hz, self.h);
         let (mut on_v, mut on_i) = (filter, filter);
         let mut data = Data::default();
         for (n, (v, i)) in clean.into_iter().enumerate() {

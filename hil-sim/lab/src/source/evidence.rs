@@ -46,6 +46,7 @@ impl Evidence {
             known.1.recomputed = ours.recomputed.or(known.1.recomputed);
             known.1.simulated = known.1.simulated.or(ours.simulated);
             known.1.used = known.1.used.or(ours.used);
+            known.1.unknown = known.1.unknown.or(ours.unknown);
             known.1.against = known.1.against.max(ours.against);
         }
         self.runs.push((experiment.to_owned(), outcome.clone()));
@@ -210,16 +211,20 @@ impl Evidence {
             chapter.outcome.metrics.set("printed_values", values);
         }
         for (experiment, outcome) in &self.runs {
-            let Some(&home) = homes.get(&**experiment) else { continue };
-            chapters[home].outcome.remarks.extend_from_slice(&outcome.remarks);
-            let source = chapters[home].source;
+            // An experiment that gives no printed value repeats a figure of S1.
+            let home = homes.get(&**experiment).copied();
+            if let Some(home) = home {
+                chapters[home].outcome.remarks.extend_from_slice(&outcome.remarks);
+            }
+            let source = home.map_or("S1", |home| chapters[home].source);
             for figure in outcome.figures.iter().filter(|figure| figure.source.contains("Figure")) {
                 // The figure belongs to the chapter in which the source has it.
                 let number = figure.source.split([' ', ',']).nth(1).unwrap_or_default();
                 let id =
                     FIGURES.get(&format!("{source} {number}")).map(|id| format!("{source}-{id}"));
                 let at = chapters.iter().position(|chapter| Some(&chapter.name) == id.as_ref());
-                let chapter = &mut chapters[at.unwrap_or(home)];
+                let Some(at) = at.or(home) else { continue };
+                let chapter = &mut chapters[at];
                 let row = [
                     ("figure", Cell::from(&*figure.source)),
                     ("section", chapter.name.as_str().into()),
@@ -297,13 +302,25 @@ impl Evidence {
             ("unit", printed.unit.as_str().into()),
             ("printed", value),
             ("recomputed", shown(ours.and_then(|ours| ours.recomputed))),
-            ("by", printed.formula.as_deref().map_or("-".into(), Cell::from)),
+            ("by", Cell::or_dash(printed.formula.as_deref().map(|text| notation(text).into()))),
             ("simulated", shown(ours.and_then(|ours| ours.simulated))),
             ("against", self.against(place).name().into()),
             ("difference (%)", Cell::fixed_or_dash(difference, 2)),
             ("verdict", self.verdict(place).1.into()),
         ]
     }
+}
+
+/// Returns a formula in the notation of the sources, with the quantity of a printed value in place of its name.
+fn notation(formula: &str) -> String {
+    let in_print = |(part, is_name): (&str, bool)| match part.split_once(" | ") {
+        Some((_, quantity)) if is_name => quantity.to_owned(),
+        _ => {
+            let signs = [("TAU", "2π"), ("PI", "π"), ("sqrt", "√"), ("*", " · "), ("/", " / ")];
+            signs.iter().fold(part.to_owned(), |text, (code, sign)| text.replace(code, sign))
+        }
+    };
+    formula.split(['{', '}']).zip([false, true].into_iter().cycle()).map(in_print).collect()
 }
 
 /// A chapter of a source.
