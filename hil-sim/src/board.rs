@@ -3,7 +3,7 @@
 //! The virtual board is a separate program, because its emulator is GPL-2.0 and must not be linked here.
 //! This module parses the options, builds image and program, and replaces this process with that program.
 
-mod build;
+pub(crate) mod build;
 
 pub use build::image;
 

@@ -97,7 +97,7 @@ fn cargo() -> Command {
 
 /// Returns the repository around this program, or otherwise around the current folder. A shipped program contains no
 /// path of the machine that built it.
-fn root() -> Result<PathBuf, Error> {
+pub(crate) fn root() -> Result<PathBuf, Error> {
     let places = [std::env::current_exe(), std::env::current_dir()];
     let mut folders = places.iter().flatten().flat_map(|place| place.ancestors());
     let root = folders.find(|folder| folder.join("hil-sim/virtual-board").is_dir());

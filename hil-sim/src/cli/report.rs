@@ -77,6 +77,7 @@ fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> 
             name: &chapter.name,
             stands_for: chapter.source,
             about: &chapter.about,
+            open: chapter.runs.is_empty() || !chapter.outcome.figures.is_empty(),
             command: chapter.runs.iter().map(command).collect::<Vec<_>>().join("\n"),
             outcome: &chapter.outcome,
         })

@@ -97,7 +97,7 @@ impl<'a> Run<'a> {
     pub fn section(&self, outcome: &'a Outcome) -> Section<'a> {
         let Experiment { name, stands_for, about, .. } = self.experiment;
         let command = self.input.command(&self.command, self.config);
-        Section { name, stands_for, about, command, outcome }
+        Section { name, stands_for, about, command, open: false, outcome }
     }
 
     /// Writes the files of an outcome and prints its results; returns the JSON object if requested.

@@ -1,9 +1,11 @@
 //! One self-contained page: no script, no network.
 
 use std::fmt::Write as _;
+use std::process::Command;
 
 use super::plot;
 use super::prose::{escape, number, prose};
+use crate::board::build;
 use crate::error::Error;
 use crate::outcome::{Cell, Metrics, Origin, Outcome, Table, name};
 
@@ -17,6 +19,8 @@ pub struct Section<'a> {
     pub about: &'a str,
     /// The command line that repeats it.
     pub command: String,
+    /// Whether the section is open on a page of several sections.
+    pub open: bool,
     /// The outcome.
     pub outcome: &'a Outcome,
 }
@@ -41,17 +45,27 @@ pub fn page(title: &str, origin: &Origin, sections: &[Section<'_>]) -> Result<St
         _ => title.clone(),
     };
     let (style, plots) = (include_str!("page.css"), plot::STYLE);
-    let (version, seed) = (env!("CARGO_PKG_VERSION"), origin.seed);
+    let (version, seed, commit) = (env!("CARGO_PKG_VERSION"), origin.seed, commit());
     let date = chrono::Utc::now().format("%Y-%m-%d %H:%M");
     let settings = settings(&origin.settings);
     Ok(format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{tab}</title>\n<style>\n{style}{plots}</style>\n</head>\n<body>\n<header>\n\
-         <h1>{title}</h1>\n<p>Simulated by hil-sim {version} on {date} UTC with seed {seed}. \
+         <h1>{title}</h1>\n<p>Simulated by hil-sim {version}{commit} on {date} UTC with seed {seed}. \
          {settings}</p>\n<p>Figure, table and equation numbers are those of Barroso (2017), unless \
          another source is named.</p>\n</header>\n{body}</body>\n</html>\n"
     ))
+}
+
+/// Returns the number of the sources of this program, and the commit of its repository if it runs there.
+fn commit() -> String {
+    let describe = ["describe", "--always", "--dirty", "--abbrev=10"];
+    let git = |root| Command::new("git").args(describe).current_dir(root).output().ok();
+    let found = build::root().ok().and_then(git).filter(|output| output.status.success());
+    let commit = found.map_or_else(|| b"unknown".to_vec(), |output| output.stdout);
+    let commit = escape(String::from_utf8_lossy(&commit).trim());
+    format!(" (sources {}, commit {commit})", env!("HIL_SIM_SOURCES"))
 }
 
 fn settings(changed: &[(String, String)]) -> String {
@@ -115,8 +129,7 @@ fn write_section(body: &mut String, section: &Section<'_>, folded: bool) -> Resu
     }
     if folded {
         let (plots, tables) = (outcome.figures.len(), outcome.tables.len());
-        // A section without a command is the head of other sections.
-        let open = if command.is_empty() { " open" } else { "" };
+        let open = if section.open { " open" } else { "" };
         let _ = writeln!(body, "<details{open}><summary>{plots} plots, {tables} tables</summary>");
     }
     write_metrics(body, &outcome.metrics);
@@ -196,7 +209,10 @@ fn write_table(body: &mut String, table: &Table) {
         for (column, cell) in row.iter().enumerate() {
             // On a narrow page the cells of a row lie below each other, each with its head.
             let head = escape(table.columns.get(column).map_or("", String::as_str));
-            let (class, cell) = (class(column), shown(cell));
+            let (class, mut cell) = (class(column), shown(cell));
+            if head == "section" {
+                cell = format!("<a href=\"#{cell}\">{cell}</a>");
+            }
             let _ = write!(body, "<td{class} data-head=\"{head}\">{cell}</td>");
         }
         body.push_str("</tr>\n");
