@@ -11,6 +11,7 @@ use glob::glob;
 use sha2::{Digest, Sha256};
 
 use crate::files::{copy, copy_as, files};
+use crate::results::outdated;
 use crate::sbom::Sbom;
 use crate::toolchain::{self, Target};
 use crate::{image, paths, python, run, tools, web};
@@ -37,6 +38,9 @@ pub struct Dist {
     /// Only the programs for this machine, with their licences and lists of crates
     #[arg(long)]
     programs: bool,
+    /// Also with results in the book that are older than their inputs
+    #[arg(long)]
+    older_results: bool,
     /// Builds everything again in a clone elsewhere; fails if a file differs
     #[arg(long, conflicts_with = "programs")]
     twice: bool,
@@ -44,6 +48,14 @@ pub struct Dist {
 
 /// Makes the folder `target/dist`. Existing wheels of this version in `target/wheels` are included.
 pub fn dist(options: &Dist) -> Result<()> {
+    let older = if options.programs || options.older_results { Vec::new() } else { outdated()? };
+    let names: Vec<_> = older.iter().map(|result| &*result.name).collect();
+    ensure!(
+        names.is_empty(),
+        "results/ has numbers that are older than control, plant or experiment: {}. `cargo xtask prove results` measures them \
+         again; --older-results ships them as they are",
+        names.join(", ")
+    );
     let folder = run::folder("dist")?;
     fs::remove_dir_all(&folder)?;
     let host = run::output("rustc", &["--print", "host-tuple"])?;
@@ -122,7 +134,7 @@ fn same_elsewhere(here: &Path) -> Result<()> {
     for made in ["tools", "wheels"] {
         copy(&run::folder(made)?, &clone.join("target").join(made))?;
     }
-    let mut command = run::cargo("xtask dist");
+    let mut command = run::cargo("xtask dist --older-results");
     command.current_dir(&clone).env("CARGO_TARGET_DIR", clone.join("target"));
     run::step("release in another folder", &mut command)?;
     let (ours, theirs) = (sums(here)?, sums(&clone.join("target/dist"))?);

@@ -15,6 +15,7 @@ mod modules;
 mod paths;
 mod prove;
 mod python;
+mod results;
 mod rooms;
 mod run;
 mod sbom;
@@ -108,9 +109,9 @@ enum Task {
     Python,
     /// Makes the folder of a release: images, programs, drive in a browser, book, lists of crates, licences, check sums
     Dist(dist::Dist),
-    /// Long proofs in shards, which a later call continues. Without a name it lists them
+    /// Long proofs in shards, which a later call continues. Without a name it lists them, and the results that are older than their inputs
     Prove {
-        /// Name of the proof
+        /// Name of the proof; `results` measures the older results again
         name: Option<String>,
         /// Part of its shards, K/N with K from 1
         #[arg(default_value = "1/1")]

@@ -11,6 +11,7 @@ use anyhow::{Context, Result, ensure};
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::results::{self, Outdated, outdated};
 use crate::{run, sources};
 
 /// The file of the proofs.
@@ -66,20 +67,30 @@ fn proofs() -> Result<Vec<Proof>> {
 pub fn list() -> Result<()> {
     for proof in proofs()? {
         let (Proof { name, about, .. }, shards) = (&proof, proof.shards());
-        let results = results(&proof)?;
-        let done = results.iter().filter(|file| file.is_file()).count();
+        let done = outputs(&proof)?;
+        let done = done.iter().filter(|file| file.is_file()).count();
         println!("{name:<16}{done:>3} of {shards:>2} shards done   {about}");
+    }
+    for Outdated { name, command, is_automatic } in outdated()? {
+        let copied = if is_automatic { "" } else { "; its numbers are copied by hand" };
+        println!("results/{name}.json is older than its inputs: {command}{copied}");
     }
     Ok(())
 }
 
-/// Runs the missing shards of a part (`K/N`) of a proof; fails if one fails.
+/// Runs the missing shards of a part (`K/N`) of a proof, or measures a part of the older results again; fails if one fails.
 pub fn prove(name: &str, part: &str) -> Result<()> {
+    if name == "results" {
+        let mut older = outdated()?;
+        older.retain(|result| result.is_automatic);
+        shards(older.len(), part)?.into_iter().try_for_each(|k| results::renew(&older[k]))?;
+        return list();
+    }
     let proof = proofs()?.into_iter().find(|proof| proof.name == name);
     let proof = proof.with_context(|| format!("no proof is named {name}: cargo xtask prove"))?;
     let changes = run::output("git", &["status", "--porcelain", "--untracked-files=no"]);
     ensure!(changes?.is_empty(), "commit first: results hold for a commit");
-    let results = results(&proof)?;
+    let results = outputs(&proof)?;
     for shard in shards(proof.shards(), part)? {
         let done = &results[shard];
         if !done.is_file() {
@@ -96,7 +107,7 @@ pub fn prove(name: &str, part: &str) -> Result<()> {
 }
 
 /// The files of the results of all shards. They are valid for one commit.
-fn results(proof: &Proof) -> Result<Vec<PathBuf>> {
+fn outputs(proof: &Proof) -> Result<Vec<PathBuf>> {
     let commit = run::output("git", &["rev-parse", "--short=10", "HEAD"])?;
     let dir = run::target_dir()?.join("prove").join(&proof.name).join(commit);
     Ok((1..=proof.shards()).map(|number| dir.join(format!("{number}.txt"))).collect())
