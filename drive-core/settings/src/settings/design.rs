@@ -138,7 +138,7 @@ impl Settings {
             saliency_check: (t.check && tracks)
                 .then(|| SaliencyCheck::new(t.flux_saliency, m.tau_r())),
             noise_watch: (self.angle_source == AngleSource::Injection)
-                .then(|| NoiseWatch::new(t.flux_saliency, carrier_a)),
+                .then(|| NoiseWatch::new(t.flux_saliency, carrier_a, self.sensor_noise_a())),
             travel_watch: TravelWatch::new(self.share_of_range(1.0)),
             at_start: tracks
                 .then(|| AtStart { decay: periods(DECAY_T * m.tau_r()), learned: None }),

@@ -267,9 +267,15 @@ settings! {
         /// cross zero at a start, where the inverter voltage error is uncertain. (With a spindle's 20 V instead of 36 V, a motor that
         /// saturates loses the lock because of the dead time.) The injection current fits between the current limit and the trip. And
         /// the voltage is between 20 V and 110 V at 311 V: near V_dc / sqrt 3 no voltage would be left for the fundamental, and the
-        /// lock monitor needs an injection.
+        /// lock monitor needs an injection. At last [`torque_pct`](Self::torque_pct) bounds the torque ripple.
         amplitude_v: Option<f32> = None, 45: auto("V", carrier_v: Settings::carrier_rule)
             .beside(|s| (if s.watches_lock() { 0.003 * s.inverter.dc_link_v } else { 0.0 }, 0.55 * s.inverter.dc_link_v)).learned();
+        /// largest torque ripple of the injection, of the rated torque
+        ///
+        /// It is the amplitude at 600 Hz and bounds `injection.amplitude_v` unless that is set. The angle error at rest grows about with
+        /// the root of the reduction: a bound of half the ripple costs 0.2° to 0.6° rms of 1°. Below 0.7 of the voltage that noise and dead
+        /// time ask for, the errors in torque steps grow faster, from 5° to 10° and more.
+        torque_pct: f32 = 20.0, 134: number("%").from_to(1.0, 200.0);
         /// demodulation of the injection current
         demodulator: DemodulatorKind = DemodulatorKind::Synchronous, 46: word().learned();
         /// Settings of the chain of the dissertation.

@@ -272,7 +272,10 @@ impl Settings {
         let wanted = f32::max(by_noise, of_link);
         let room = CARRIER_OF_ROOM * (self.trip_a() - self.current_limit_a());
         let most = f32::min(f32::max(0.5 * self.i_d() * reactance, of_link), room * reactance);
-        f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
+        let sensed =
+            f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0));
+        let nm = WITHIN / 100.0 * self.injection.torque_pct * self.nameplate.torque_nm();
+        f32::min(sensed, nm / self.motor.torque_per_ampere(self.i_d()) * reactance)
     }
 
     fn carrier_reactance(&self) -> f32 {

@@ -79,11 +79,16 @@ impl Settings {
         Estimator { angle_loop: L::of(filter, &printed), lag: lag_share * carrier_lag }
     }
 
+    /// Returns the noise of a current sensor that is assumed in the design, A rms.
+    pub(super) fn sensor_noise_a(&self) -> f32 {
+        self.share_of_range(NOISE_A)
+    }
+
     /// Returns the variances of the angle filter, from motor, inverter and sensors, for an amplitude `carrier_a` of the injection
     /// current, A.
     fn angle_filter(&self, carrier_a: f32) -> AngleFilter {
         const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
-        let (m, i_d, noise_a) = (&self.motor, self.i_d(), self.share_of_range(NOISE_A));
+        let (m, i_d, noise_a) = (&self.motor, self.i_d(), self.sensor_noise_a());
         let flux = m.coupled_inductance() * i_d;
         // This is the speed error of the observer per change of the current.
         let per_a = m.sigma_l_s() / (flux * CARRIER_S);
