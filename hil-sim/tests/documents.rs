@@ -255,21 +255,10 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
         writeln!(list, "| `{}` | {} | {unverified} |", motor.name, motor.title).unwrap();
     }
     generated::check("motors.md", "motors-list", &list);
-    let mut list = "| motor | injected voltage, V | current, A | of the rated current, % | torque ripple, Nm | of the rated torque, % |\n\
-                    |---|---|---|---|---|---|\n"
+    let list = "| motor | injected voltage, V | current, A | of the rated current, % | q axis: torque ripple at rest, % | largest, % | angle error, rms / largest, ° | d axis: largest torque ripple, % | angle error, rms / largest, ° |\n\
+                |---|---|---|---|---|---|---|---|---|\n"
         .to_owned();
-    for Motor { name, .. } in Motor::all() {
-        let config = Config::of_motor(Some(&name)).unwrap();
-        let (volts, amperes) = (config.drive.carrier_v(), config.drive.injection_a());
-        let (nm, of_current) =
-            (config.drive.injection_nm(), 100.0 * amperes / config.drive.rated_a());
-        let of_torque = 100.0 * f64::from(nm) / config.rated_nm();
-        writeln!(
-            list,
-            "| `{name}` | {volts:.1} | {amperes:.3} | {of_current:.0} | {nm:.3} | {of_torque:.0} |"
-        )
-        .unwrap();
-    }
+    let list = list + &crate::injection_torque::rows();
     generated::check("performance.md", "injection", &list);
     let mut shaft = Results::read(&generated::root().join("results/shaft.json"));
     for row in &mut shaft.rows {

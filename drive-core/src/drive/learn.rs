@@ -37,6 +37,7 @@ impl<L: AngleLoop> Drive<L> {
             per_looked: check.map_or(0.0, |check| check.per_mean()),
             baseline: field.lock.baseline,
             at_start: field.at_start,
+            axis: c.injection_axis,
         };
         let learned = c.learning.result(learning, &start);
         self.kept.learned = Some(learned);
@@ -67,7 +68,7 @@ impl<L: AngleLoop> Coefficients<L> {
         let sample = LearningSample {
             signal,
             carrier_squared: saliency.carrier_squared,
-            theta: k.seen.phi + Angle::QUARTER,
+            theta: k.seen.phi + self.injection_turn,
             flux_freq: k.seen.flux_freq,
             voltage: k.seen.voltage,
         };

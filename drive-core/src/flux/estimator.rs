@@ -97,6 +97,9 @@ pub struct Estimator<L> {
     pub angle_loop: L,
     /// Lag of the sampled injection current behind the injection axis, samples.
     pub lag: f32,
+    /// Sign of the demodulated saliency: 1 with the injection across the flux, -1 along it, where both components of the saliency have
+    /// the opposite sign.
+    pub sign: f32,
 }
 
 /// State of the estimator, with the state `S` of its loop.
@@ -215,7 +218,7 @@ impl<L: AngleLoop> Estimator<L> {
         };
         let saliency = &state.synchronous.saliency;
         let point = schedule.at(saliency.i_q);
-        let deviation = saliency.q - point.reference;
+        let deviation = self.sign * saliency.q - point.reference;
         state.angle_error = point.lasting * deviation;
         let (correction, resistance) = if filters {
             filter.see_carrier(&mut state.filter, point.gain * deviation, point.gain)

@@ -85,6 +85,8 @@ pub struct Learning {
     points: usize,
     /// Whether the signal is the saliency, so that its sensitivity is also learned. Otherwise it is a current difference.
     pub(crate) normalised: bool,
+    /// Sign of the saliency along the injection axis, as in [`Estimator`](crate::flux::Estimator).
+    sign: f32,
     /// Lead x of the flux, rad.
     lead: f32,
     /// Settling times of the flux, in rotor time constants: from one current with a lead to the next, and at the largest
@@ -171,8 +173,9 @@ pub struct Operate {
 
 impl Learning {
     /// Creates the self-commissioning for a motor with the d-axis current `i_d`, A, and currents up to `largest_a`, A peak, at the
-    /// q-axis currents of `grid`. `normalised`: the signal is the saliency, not a current difference.
-    pub fn new(motor: &Motor, i_d: f32, largest_a: f32, grid: Grid, normalised: bool) -> Self {
+    /// q-axis currents of `grid`. `sign`: the sign of the saliency along the injection axis, if the signal is the saliency; `None` if it
+    /// is a current difference.
+    pub fn new(motor: &Motor, i_d: f32, largest_a: f32, grid: Grid, sign: Option<f32>) -> Self {
         let most = fpu_sqrt::sqrtf(largest_a * largest_a - i_d * i_d) / grid.step_a();
         let coupled = motor.coupled_inductance();
         let half_step = 0.5 * grid.step_a() / i_d;
@@ -194,7 +197,8 @@ impl Learning {
             first,
             grid,
             points,
-            normalised,
+            normalised: sign.is_some(),
+            sign: sign.unwrap_or(1.0),
             lead,
             flux_t: [2.0, 2.0 * points as f32].map(|steps| {
                 let change = steps * grid.step_a() * libm::sinf(lead) / i_d;
@@ -288,7 +292,7 @@ impl Learning {
         }
         let (first_signal, first_voltage) = state.first_of_pair;
         if let Some(q) = state.odd.get_mut(point.lead).and_then(|odd| odd.get_mut(point.n)) {
-            *q = 0.5 * (first_signal - signal);
+            *q = 0.5 * self.sign * (first_signal - signal);
         }
         let even = 0.5 * (first_signal + signal);
         let (sum, least, largest) = state.even;

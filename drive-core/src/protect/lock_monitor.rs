@@ -14,7 +14,8 @@
 //! loss = (1 - |C|^2 / |C|_ref^2) (-1/k) = 1 - f cos 2e                 k = 2a
 //! ```
 //!
-//! (a of either sign, fixed to the flux; e the angle error, f = 1 at nominal flux). `loss` is the saliency deficit. It
+//! (with the injection across the flux; along it `Re s` and `Im s` have the opposite signs; a of either sign, fixed to the flux; e the
+//! angle error, f = 1 at nominal flux). `loss` is the saliency deficit. It
 //! is 0 at the true angle, 1 without flux, 2 at an error of 90°, and averages to 1 when the flux rotates under the
 //! axis. Resistances, dead time and speed hardly influence the deficit, and no perturbation is needed. The voltage
 //! equation does not help at low speed: a wrong angle changes it by less than 1 V, while the dead time alone leaves 2
@@ -49,8 +50,11 @@ pub struct LockMonitor {
     grid: Grid,
     /// 1 / ratio^2 of the table of the injection current.
     inverse_square: [f32; POINTS],
-    /// Saliency deficit per relative change of the squared injection current, -1/k.
+    /// Saliency deficit per relative change of the squared injection current: -1/k, with the other sign if the injection lies along
+    /// the flux.
     per_change: [f32; POINTS],
+    /// Sign of the saliency, see [`LockMonitorSettings::sign`].
+    sign: f32,
     /// Share of the newest value in the mean deficit.
     smoothing: f32,
     /// Allowed deficit, and whether the sensitivity is positive, which determines the limit of a negative deficit.
@@ -73,6 +77,8 @@ pub struct LockMonitorSettings {
     pub allowed: f32,
     /// Expected injection current along the injection axis, A peak.
     pub carrier_a: f32,
+    /// Sign of the saliency along the injection axis, as in [`Estimator`](crate::flux::Estimator).
+    pub sign: f32,
     /// Change of the q-axis current in an injection period above which the monitor pauses, A.
     pub moved_a: f32,
 }
@@ -126,8 +132,8 @@ const REST: u8 = 12;
 /// Pauses therefore take 40 % of the time at most, and 24 injection periods at once.
 const ALLOWANCE: (u8, u8, u8) = (3, 2, 72);
 
-fn per_change(slope: &SlopeTable) -> [f32; POINTS] {
-    slope.inverses(MOST_UNIT).map(|inverse| -inverse)
+fn per_change(slope: &SlopeTable, sign: f32) -> [f32; POINTS] {
+    slope.inverses(MOST_UNIT).map(|inverse| -sign * inverse)
 }
 
 fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
@@ -141,7 +147,8 @@ impl LockMonitor {
         Self {
             grid: table.grid(),
             inverse_square: inverse_square(table),
-            per_change: per_change(&s.slope),
+            per_change: per_change(&s.slope, s.sign),
+            sign: s.sign,
             is_positive: s.slope.at_rest() > 0.0,
             moved: s.moved_a,
             smoothing: CARRIER_S / (s.smoothing_s + CARRIER_S),
@@ -154,7 +161,8 @@ impl LockMonitor {
     pub fn take(&mut self, learned: &Learned) {
         if let (Some(carrier), Some(slope)) = (&learned.carrier, &learned.slope) {
             (self.grid, self.inverse_square) = (carrier.grid(), inverse_square(carrier));
-            (self.per_change, self.is_positive) = (per_change(slope), slope.at_rest() > 0.0);
+            (self.per_change, self.is_positive) =
+                (per_change(slope, self.sign), slope.at_rest() > 0.0);
         }
     }
 

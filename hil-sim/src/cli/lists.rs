@@ -123,7 +123,8 @@ fn motor_text(motor: &Motor) -> Result<String, Error> {
     let Motor { name, title, about, .. } = motor;
     let (about, table) = (about.trim(), report::table(&table));
     let (m, carrier) = (config.drive.motor, config.drive.carrier_v());
-    let (amperes, nm) = (config.drive.injection_a(), config.drive.injection_nm());
+    let (amperes, nm) =
+        (config.drive.injection_a(), config.drive.injection_nm(&config.drive.reference()));
     let percent = 100.0 * f64::from(nm) / config.rated_nm();
     let (leakage, tau_r) = (1e3 * m.sigma_l_s(), 1e3 * m.tau_r());
     let lines = motor.console_lines().join("\n");

@@ -6,7 +6,7 @@ mod scalar;
 
 use core::f32::consts::TAU;
 
-use crate::settings::{CurrentSensors, PlantSource, Settings, SettingsError};
+use crate::settings::{CurrentSensors, InjectionAxis, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, MotionDesign, SpeedSource, TuningError};
 use drive_core::carrier::{AtStart, Injection};
 use drive_core::current::{DeadTime, DqPi, InverterDrop, Modulator, Pi, VoltageLimit};
@@ -88,7 +88,8 @@ impl Settings {
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
         let injection = Injection::new(carrier_v, motor_plant, current_lag);
         let carrier_a = injection.current_amplitude;
-        let (injection_turn, injection_axis) = if inj.demodulator.is_along_flux() {
+        let along_flux = inj.axis == InjectionAxis::D || inj.demodulator.is_along_flux();
+        let (injection_turn, injection_axis) = if along_flux {
             (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 })
         } else {
             (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 })
@@ -137,8 +138,9 @@ impl Settings {
             // Only a sensorless start with the synchronous demodulation is checked.
             saliency_check: (t.check && tracks)
                 .then(|| SaliencyCheck::new(t.flux_saliency, m.tau_r())),
-            noise_watch: (self.angle_source == AngleSource::Injection)
-                .then(|| NoiseWatch::new(t.flux_saliency, carrier_a, self.sensor_noise_a())),
+            noise_watch: (self.angle_source == AngleSource::Injection).then(|| {
+                NoiseWatch::new(t.flux_saliency, carrier_a, self.share_of_range(estimator::NOISE_A))
+            }),
             travel_watch: TravelWatch::new(self.share_of_range(1.0)),
             at_start: tracks
                 .then(|| AtStart { decay: periods(DECAY_T * m.tau_r()), learned: None }),
@@ -197,7 +199,8 @@ impl Settings {
     /// Returns the saliency self-commissioning with these settings, which must be [valid](Self::check).
     pub fn learning(&self) -> Learning {
         let synchronous = self.injection.demodulator == DemodulatorKind::Synchronous;
-        Learning::new(&self.motor, self.i_d(), self.current_limit_a(), self.grid(), synchronous)
+        let sign = synchronous.then(|| self.injection.axis.sign());
+        Learning::new(&self.motor, self.i_d(), self.current_limit_a(), self.grid(), sign)
     }
 
     /// Returns the selection of the phases to be used, with three shunts.
@@ -218,6 +221,7 @@ impl Settings {
             smoothing_s: t.deficit_s,
             allowed: t.allowed_deficit,
             carrier_a,
+            sign: self.injection.axis.sign(),
         };
         LockMonitor::new(&self.carrier(), &settings)
     }

@@ -98,6 +98,23 @@ words! {
     }
 }
 
+words! {
+    /// Axis of the injection in the frame of the flux.
+    pub enum InjectionAxis {
+        /// Across the flux.
+        Q = "q",
+        /// Along the flux.
+        D = "d",
+    }
+}
+
+impl InjectionAxis {
+    /// Returns the sign of the saliency along this axis, relative to the q axis.
+    pub const fn sign(self) -> f32 {
+        if matches!(self, Self::Q) { 1.0 } else { -1.0 }
+    }
+}
+
 words!(AngleSource { Encoder = "encoder", Injection = "injection", });
 words!(DemodulatorKind {
     Literal = "literal",
@@ -110,6 +127,9 @@ words!(DemodulatorKind {
 /// Reasons why shunts below the low sides are sampled in one zero vector and at 6 kHz only, and why a demodulation is missing.
 const BLIND: &str = "shunts below the low sides see nothing in the upper zero vector; set it to no";
 const SLOW: &str = "shunts below the low sides settle too slowly for shorter pulses; set it to 6";
+/// Reasons why the injection does not lie along the flux.
+const SYNCHRONOUS_ALONE: &str = "only the synchronous demodulation reads it; set injection.demodulator to synchronous, or this to q";
+const BEYOND_I_D: &str = "the injection current would be larger than the d-axis current (sequence.i_d); set injection.amplitude_v lower, or this to q";
 const LEFT_OUT: &str = "this build is without this block";
 const ABSENT: &str = "this image is built with synchronous alone; `cargo firmware --loop printed` builds one with all";
 
@@ -137,7 +157,12 @@ impl Settings {
     pub fn check(&self) -> Result<(), SettingsError> {
         self.check_words(DemodulatorKind::HAS_ALL)?;
         let scales = SETTINGS.iter().filter(|entry| entry.name.starts_with("scales."));
-        scales.chain(SETTINGS).try_for_each(|entry| entry.check(self))
+        scales.chain(SETTINGS).try_for_each(|entry| entry.check(self))?;
+        let reads = self.injection.demodulator == DemodulatorKind::Synchronous;
+        let serves = reads && self.injection_a() <= self.i_d();
+        let why = if reads { BEYOND_I_D } else { SYNCHRONOUS_ALONE };
+        let is_q = self.injection.axis == InjectionAxis::Q;
+        (is_q || serves).then_some(()).ok_or(SettingsError::Word("injection.axis", "d", why))
     }
 
     /// Checks that the build contains the demodulation (`has_all`: it contains all, otherwise the synchronous one alone), and

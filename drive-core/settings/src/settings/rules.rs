@@ -40,7 +40,7 @@ use core::f32::consts::{FRAC_1_SQRT_2, SQRT_2, TAU};
 
 use super::list::RATED_A;
 use super::numbers::{TRIP_OF_RANGE, WITHIN, either_sign, or_rule};
-use super::{CurrentSensors, Flux, IdentifiedPlant, Inverter, Nameplate, Settings};
+use super::{CurrentSensors, Flux, IdentifiedPlant, InjectionAxis, Inverter, Nameplate, Settings};
 use crate::tuning::motor_plant;
 use drive_core::printed::DemodulatorKind;
 use drive_core::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
@@ -275,7 +275,8 @@ impl Settings {
         let sensed =
             f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0));
         let nm = WITHIN / 100.0 * self.injection.torque_pct * self.nameplate.torque_nm();
-        f32::min(sensed, nm / self.motor.torque_per_ampere(self.i_d()) * reactance)
+        let shaking = nm / self.motor.torque_per_ampere(self.i_d()) * reactance;
+        if self.injection.axis == InjectionAxis::Q { sensed.min(shaking) } else { sensed }
     }
 
     fn carrier_reactance(&self) -> f32 {
@@ -289,9 +290,13 @@ impl Settings {
     }
 
     /// Returns the amplitude of the torque that the injection current causes at 600 Hz, Nm. The rotor flux is constant during an injection
-    /// period, because the rotor time constant is much longer.
-    pub fn injection_nm(&self) -> f32 {
-        self.motor.torque_per_ampere(self.i_d()) * self.injection_a()
+    /// period, because the rotor time constant is much longer. On the d axis, the part of the current across the flux makes the torque; it
+    /// follows from the saliency offset `offset` and is that at rated torque.
+    pub fn injection_nm(&self, offset: &ReferenceTable) -> f32 {
+        let per_ampere = self.motor.torque_per_ampere(self.i_d());
+        let turned = offset.at(self.nameplate.torque_nm() / per_ampere).abs();
+        let across = if self.injection.axis == InjectionAxis::Q { 1.0 } else { turned };
+        per_ampere * self.injection_a() * across
     }
 
     /// Returns the plant of the d axis for the design of its current controller. The rule is the plant that was identified
@@ -334,7 +339,11 @@ impl Settings {
 
     /// Returns the injection current over the q-axis current.
     pub fn carrier(&self) -> CarrierTable {
-        let guess = || CarrierTable::guessed(self.grid());
+        let guess = || {
+            let (guessed, sign) = (CarrierTable::guessed(self.grid()), self.injection.axis.sign());
+            let points = guessed.points().map(|ratio| 1.0 + sign * (ratio - 1.0));
+            CarrierTable::from_points(guessed.grid(), points).unwrap_or(guessed)
+        };
         self.injection.synchronous.carrier.unwrap_or_else(guess)
     }
 }

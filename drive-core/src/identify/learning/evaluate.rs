@@ -26,6 +26,8 @@ pub struct Start {
     pub baseline: f32,
     /// Asymmetry that was measured before there was current or flux.
     pub at_start: Option<Asymmetry>,
+    /// Injection axis in the frame of the flux.
+    pub axis: UnitVector,
 }
 
 impl Learning {
@@ -58,8 +60,7 @@ impl Learning {
             all.take_out(&mut saliency, axis);
             saliency
         };
-        let across = UnitVector { cos: 0.0, sin: 1.0 };
-        let baseline = seen(0.0, start.baseline, across).carrier_squared;
+        let baseline = seen(0.0, start.baseline, start.axis).carrier_squared;
         let looked = start.looked.map_or(0.0, |q| seen(q, 0.0, SaliencyCheck::LOOK_AXIS).q);
         Learned {
             reference: reference.unwrap_or_default(),

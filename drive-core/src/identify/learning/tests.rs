@@ -1,6 +1,7 @@
 //! Tests of the self-commissioning on signals and voltages of given motors and sensors.
 #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
 use super::*;
+use crate::UnitVector;
 use crate::carrier::Asymmetry;
 use crate::table::{ReferenceTable, SlopeTable};
 use core::f64::consts::TAU as TURN;
@@ -14,12 +15,13 @@ fn carrier(i_q: f32) -> f32 {
 }
 
 fn learning() -> Learning {
-    Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, true)
+    Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, Some(1.0))
 }
 
 /// Returns the measurements before the points: no check, and the injection current without q-axis current.
 fn start() -> Start {
-    Start { looked: None, per_looked: 0.0, baseline: CARRIER * CARRIER, at_start: None }
+    let axis = UnitVector { cos: 0.0, sin: 1.0 };
+    Start { looked: None, per_looked: 0.0, baseline: CARRIER * CARRIER, at_start: None, axis }
 }
 
 /// Runs through all points with the signal `q(i_q, lead, theta)` and the voltage `v(i_q)`. If the self-commissioning ends, each
@@ -28,7 +30,15 @@ fn learn(
     q: impl Fn(f64, f64, f64) -> f64,
     v: impl Fn(f32) -> Dq,
 ) -> (Result<(), Fault>, LearningState) {
-    let (learning, mut state) = (learning(), LearningState::default());
+    learn_with(&learning(), q, v)
+}
+
+fn learn_with(
+    learning: &Learning,
+    q: impl Fn(f64, f64, f64) -> f64,
+    v: impl Fn(f32) -> Dq,
+) -> (Result<(), Fault>, LearningState) {
+    let mut state = LearningState::default();
     let (mut point, mut theta) = (Operate { i_q: 0.0, lead: 0.0 }, 0.25_f64);
     let mut begun = vec![];
     for n in 0..3_000_000 {
@@ -113,6 +123,23 @@ fn splits_the_reference_from_slope_and_mismatch() {
         }
         assert_eq!(learned.limit_a, 3.25, "to the last point");
     }
+}
+
+/// Along the flux the saliency has the opposite sign, the signal of the sensors has not, and the baseline is measured on phase a.
+#[test]
+fn along_the_flux_the_same_is_learned() {
+    let q = |i_q, lead, theta| negative_sequence(0.01, theta) - sound(i_q, lead, theta);
+    let learning = Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, Some(-1.0));
+    let (next, state) = learn_with(&learning, q, locked);
+    assert_eq!(next, Ok(()));
+    let (baseline, axis) = (CARRIER * CARRIER * 1.01, UnitVector { cos: 1.0, sin: 0.0 });
+    let learned = learning.result(&state, &Start { baseline, axis, ..start() });
+    assert_eq!(learned.verdict, Verdict::Sound);
+    assert!((learned.gain_mismatch.value - 0.01).abs() < 2e-4, "{learned:?}");
+    assert!((learned.current_saliency.value - 0.034).abs() < 1e-4, "{learned:?}");
+    assert!((learned.slope_at_rest + 0.07).abs() < 1e-3, "{learned:?}");
+    let ratios = learned.carrier.unwrap();
+    assert!((ratios.points()[8] - 1.1).abs() < 2e-3, "{:?}", ratios.points());
 }
 
 #[test]
@@ -219,7 +246,7 @@ fn the_flux_turns_at_every_point() {
     let all = |at: (f32, f32)| [(at, at.1), (at, left(at))];
     for ((i_d, largest), end) in currents.into_iter().flat_map(all) {
         let grid = Grid::for_current(end);
-        let learning = Learning::new(&Motor::default(), i_d, largest, grid, true);
+        let learning = Learning::new(&Motor::default(), i_d, largest, grid, Some(1.0));
         assert!(end == largest || learning.points == 14, "{i_d}: {}", learning.points);
         let tan = learning.lead.tan();
         assert!((0.099..0.3).contains(&tan), "{i_d}: {tan}");
@@ -249,7 +276,7 @@ fn the_flux_turns_at_every_point() {
         assert!(of(1).eq([0].into_iter().chain(led.into_iter().rev())), "{seen:?}");
     }
     // A current difference has no sensitivity.
-    let learning = Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, false);
+    let learning = Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, None);
     assert_eq!(learning.points(), 26);
 }
 

@@ -3,8 +3,8 @@
 use super::*;
 
 /// Returns a monitor with a nominal injection current of 0.26 A, 120 ms, and the sensitivity of a saliency `a` that is fixed to the
-/// flux.
-fn monitor_of(a: f32) -> LockMonitor {
+/// flux. `sign`: 1 with the injection across the flux, -1 along it.
+fn monitor_of(a: f32, sign: f32) -> LockMonitor {
     LockMonitor::new(
         &CarrierTable::default(),
         &LockMonitorSettings {
@@ -12,13 +12,14 @@ fn monitor_of(a: f32) -> LockMonitor {
             smoothing_s: 0.12,
             allowed: 0.55,
             carrier_a: 0.26,
+            sign,
             moved_a: 0.03,
         },
     )
 }
 
 fn monitor() -> LockMonitor {
-    monitor_of(-0.035)
+    monitor_of(-0.035, 1.0)
 }
 
 fn seen(carrier_a: f32, i_q: f32) -> Saliency {
@@ -67,17 +68,20 @@ fn a_lost_flux_is_seen_in_the_time_the_mean_takes() {
 fn too_much_flux_is_wrong_as_well_and_the_limit_depends_on_the_sign() {
     // The cases have a saliency, a lasting deficit, and the injection periods of 1/600 s until the fault with 120 ms: 72 ln(1 /
     // (1 - limit/deficit)).
-    for (a, loss, periods) in [
+    for ((a, loss, periods), sign) in [
         (-0.035, -1.0, Some(66.0)),
         (-0.035, -0.55, None),
         (0.035, -1.0, Some(25.7)),
         (0.035, -0.45, Some(79.0)),
         (0.035, 1.0, Some(57.5)),
         (0.035, 0.5, None),
-    ] {
-        let monitor = monitor_of(a);
+    ]
+    .into_iter()
+    .flat_map(|case| [1.0, -1.0].map(|sign| (case, sign)))
+    {
+        let monitor = monitor_of(a, sign);
         let mut state = ready(&monitor);
-        let wrong = seen(0.27 * libm::sqrtf(1.0 - 2.0 * -a * loss), 0.0);
+        let wrong = seen(0.27 * libm::sqrtf(1.0 + 2.0 * sign * a * loss), 0.0);
         let tripped = (1..=6000).find(|_| monitor.step(&mut state, &wrong, 1.0, false).is_err());
         match (tripped, periods) {
             (None, None) => {}
@@ -164,6 +168,7 @@ fn the_carrier_of_a_lost_flux_ends_the_lock() {
         smoothing_s: 0.12,
         allowed: 0.55,
         carrier_a: 0.26,
+        sign: 1.0,
         moved_a: 0.03,
     };
     let monitor = LockMonitor::new(&CarrierTable::default(), &settings);

@@ -15,7 +15,7 @@ use drive_core::{FirstOrder, PERIOD_S};
 const BPF_GROUP_DELAY: f32 = 8.83;
 
 /// Noise of a current sensor with the dissertation's sensors, A.
-const NOISE_A: f32 = 0.005;
+pub(super) const NOISE_A: f32 = 0.005;
 /// Standard deviation of the saliency relative to that noise over the injection current, with the correlation of the averages.
 const AVERAGED_NOISE: f32 = 0.68;
 /// Standard deviation of the observed speed, relative to the deviation that the noise of one sample makes in an injection period.
@@ -76,19 +76,15 @@ impl Settings {
             z_s: p.z_s,
             limit: 1.5 * speed_limit,
         };
-        Estimator { angle_loop: L::of(filter, &printed), lag: lag_share * carrier_lag }
-    }
-
-    /// Returns the noise of a current sensor that is assumed in the design, A rms.
-    pub(super) fn sensor_noise_a(&self) -> f32 {
-        self.share_of_range(NOISE_A)
+        let sign = self.injection.axis.sign();
+        Estimator { angle_loop: L::of(filter, &printed), lag: lag_share * carrier_lag, sign }
     }
 
     /// Returns the variances of the angle filter, from motor, inverter and sensors, for an amplitude `carrier_a` of the injection
     /// current, A.
     fn angle_filter(&self, carrier_a: f32) -> AngleFilter {
         const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
-        let (m, i_d, noise_a) = (&self.motor, self.i_d(), self.sensor_noise_a());
+        let (m, i_d, noise_a) = (&self.motor, self.i_d(), self.share_of_range(NOISE_A));
         let flux = m.coupled_inductance() * i_d;
         // This is the speed error of the observer per change of the current.
         let per_a = m.sigma_l_s() / (flux * CARRIER_S);
