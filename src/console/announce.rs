@@ -9,6 +9,7 @@ use drive_settings::value::Words as _;
 
 use super::Console;
 use super::handle::Firmware;
+use super::reply;
 use crate::ModuleState;
 use crate::commissioning;
 use crate::desk::Desk;
@@ -80,8 +81,10 @@ impl Console {
             News::Learned => {
                 let Some((_, result)) = desk.learned() else { return };
                 out.news(format_args!("{}", outcome(result)));
-                if let Some(tracked) = desk.settings().in_force().drive.tracked(result) {
-                    out.news(format_args!("learned: {tracked}"));
+                let drive = &desk.settings().in_force().drive;
+                if let Some(tracked) = drive.tracked(result) {
+                    let ripple = reply::ripple(drive, result);
+                    out.news(format_args!("learned: {tracked}; {ripple}"));
                 }
             }
             News::Commissioning(news) => self.tell_commissioning(news, 0),

@@ -65,7 +65,7 @@ impl Console {
             }
             ListKind::Learned => desk
                 .learned()
-                .and_then(|(in_use, result)| reply::learned(result, in_use, next))
+                .and_then(|(in_use, result)| reply::learned(result, in_use, &settings.drive, next))
                 .map(|text| say(&text, next + 1)),
             ListKind::Signals => stream::described(line).map(|text| say(&text, next + 1)),
             ListKind::Trace if drive.tracing() => return,

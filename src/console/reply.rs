@@ -4,6 +4,7 @@ use core::fmt;
 
 use drive_core::Fault;
 use drive_core::learned::{Fitted, Learned};
+use drive_settings::Settings;
 use drive_settings::entry::Change;
 use drive_settings::value::Value;
 
@@ -126,7 +127,12 @@ pub fn fault(fault: Fault, i: usize) -> Option<impl fmt::Display> {
 
 /// Line number `i` of the result of a self-commissioning; `None` after the last line. The fitted values come first, then a table of
 /// saliency offset, saliency sensitivity and injection current over the q-axis current.
-pub fn learned(result: &Learned, believable: bool, i: u16) -> Option<impl fmt::Display> {
+pub fn learned(
+    result: &Learned,
+    believable: bool,
+    drive: &Settings,
+    i: u16,
+) -> Option<impl fmt::Display> {
     let lines = 2 + result.reference.points().len().min(result.points + 1);
     let line = usize::from(i);
     (line < lines).then_some(fmt::from_fn(move |f| match line {
@@ -141,11 +147,19 @@ pub fn learned(result: &Learned, believable: bool, i: u16) -> Option<impl fmt::D
             )?;
             fitted(f, "gain mismatch", &result.gain_mismatch)?;
             fitted(f, "current saliency", &result.current_saliency)?;
-            write!(f, "flux saliency {:.5}", result.flux_saliency)
+            write!(f, "flux saliency {:.5}; ", result.flux_saliency)?;
+            write!(f, "{}", ripple(drive, result))
         }
         1 => f.write_str("i_q,reference,slope,carrier"),
         _ => point(f, result, line - 2),
     }))
+}
+
+/// The torque ripple of the injection with a learned result.
+pub fn ripple(drive: &Settings, result: &Learned) -> impl fmt::Display {
+    let nm = drive.injection_nm(&result.reference);
+    let pct = 100.0 * nm / drive.nameplate.torque_nm();
+    fmt::from_fn(move |f| write!(f, "torque ripple {nm:.3} Nm ({pct:.1} % of rated, at 600 Hz)"))
 }
 
 /// Writes a fitted value under its name.
