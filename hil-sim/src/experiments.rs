@@ -55,6 +55,7 @@ pub static EXPERIMENTS: LazyLock<Vec<Experiment>> = LazyLock::new(|| Vec::from([
     Experiment::new("position-step", |context| scenario::shipped("position-step", context)),
     Experiment::new("sensorless-position", sensorless_position::run),
     Experiment::new("torque-steps", |context| scenario::shipped("torque-steps", context)),
+    Experiment::new("injection-ripple", |context| scenario::shipped("injection-ripple", context)),
     Experiment::new("torque-ramp", |context| scenario::shipped("torque-ramp", context)),
     Experiment::new("torque-reversal", |context| scenario::shipped("torque-reversal", context)),
     Experiment::new("perturbation", perturbation::run),

@@ -179,6 +179,22 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("flux_wb", probe.i_d * config.motor.l_m);
     outcome.metrics.set("saliency_at_rest_percent", 100.0 * saliency);
     outcome.metrics.set("inductance_600_hz_mh", 1e3 * inductance);
+    let axes = |(saliency, mean): (f64, f64)| [(1.0 - saliency) * mean, (1.0 + saliency) * mean];
+    let half = axes(probe.at_rest(0.5 * probe.i_d).ok_or_else(lost)?);
+    let [d, q] = axes((saliency, inductance));
+    let [by_d, by_q] = [half[0] / d, half[1] / q].map(|ratio| 100.0 * (ratio - 1.0).abs());
+    outcome.metrics.set("voltage_d_to_q", d / q);
+    outcome.metrics.set("half_flux_d_percent", by_d);
+    outcome.metrics.set("half_flux_q_percent", by_q);
+    for (quantity, holds) in [
+        ("the quadrature axis has the lower impedance at the frequency of injection", q < d),
+        (
+            "the flux of the stator influences the impedance less on the quadrature axis",
+            by_q < by_d,
+        ),
+    ] {
+        outcome.compared.push(beside("section 5.1", quantity).simulated(holds));
+    }
     let slopes = currents.map(|i_q| probe.slope(probe.i_d, i_q));
     if let Some(slope) = slopes[0] {
         outcome.metrics.set("slope_at_rest_per_rad", slope);

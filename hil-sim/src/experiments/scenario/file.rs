@@ -58,6 +58,8 @@ pub enum Statistic {
     Overshoot,
     /// Last time at which the magnitude was beyond `within`, s.
     Settling,
+    /// Largest amplitude at the injection frequency in half a second.
+    AtInjection,
 }
 
 /// The samples that count.

@@ -164,6 +164,15 @@ impl Record {
                 let reference = self.references.last().copied().unwrap_or(f64::NAN);
                 (values().fold(f64::NAN, f64::max) / reference - 1.0).max(0.0) * 100.0
             }
+            Statistic::AtInjection => {
+                let turn = |k: usize| Complex64::cis(TAU * k as f64 / CARRIER_SAMPLES as f64);
+                let values: Vec<f64> = values().collect();
+                let amplitude = |values: &[f64]| {
+                    let sum: Complex64 = (0..).zip(values).map(|(k, x)| turn(k) * *x).sum();
+                    2.0 * sum.norm() / values.len() as f64
+                };
+                values.chunks((SETTLING_S * RATE_HZ) as usize).map(amplitude).fold(0.0, f64::max)
+            }
             Statistic::Settling => {
                 let beyond = |(_, value): &(f64, f64)| value.abs() > metric.within;
                 self.values(metric.of, metric.over).filter(beyond).last().map_or(0.0, |(t, _)| t)
