@@ -26,9 +26,8 @@ pub struct Options {
     /// Load on the shaft: `locked`, `free`, or `speed RPM`; the same as --set load.mode=...
     #[arg(long, value_names = ["LOAD", "RPM"], num_args = 1..=2, allow_negative_numbers = true)]
     pub load: Option<Vec<String>>,
-    /// Types the lines of a file (`at SECONDS: LINE`, `wait SECONDS: LINE`) and checks the answers (`wait for TEXT`,
-    /// `expect [SECONDSs] TEXT`, `expect not [SECONDSs] TEXT`); ends after the file. Exit code 1 for an unexpected
-    /// answer `error:`, a text that does not come, or a fault at the end
+    /// Plays a session as text (`> LINE` and its answer, `[2 s]`, `[until: TEXT]`) and checks the answers; ends after the
+    /// file. Exit code 1 for a wrong answer, an unexpected `error:`, a text that does not come, or a fault at the end
     #[arg(long, value_name = "FILE")]
     pub script: Option<PathBuf>,
     /// Shows unexpected errors and faults during a script, but keeps the exit code 0

@@ -13,6 +13,7 @@ pub mod passport;
 mod prelude;
 mod random;
 pub mod report;
+pub mod sessions;
 pub mod shards;
 
 pub use sim_bench::{

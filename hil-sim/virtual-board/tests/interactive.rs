@@ -200,11 +200,15 @@ fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
 #[test]
 fn a_script_turns_a_free_shaft_and_repeats_to_the_bit() {
     let script = "# a pulse of torque\n\
-                  at 1.8: start\n\
-                  wait for running: torque\n\
-                  wait 0.2: torque 0.5\n\
-                  wait 0.3: torque 0\n\
-                  wait 0.5: status\n";
+                  [1.8 s]\n\
+                  > start\n\
+                  [until: running: torque]\n\
+                  [200 ms]\n\
+                  > torque 0.5\n\
+                  [300 ms]\n\
+                  > torque 0\n\
+                  [500 ms]\n\
+                  > status\n";
     let runs = ["once", "twice"].map(|name| {
         let folder = folder(name);
         let file = folder.join("script.txt");
@@ -275,9 +279,9 @@ fn what_is_wrong_is_named_before_anything_begins() {
     refused(&run(&["--lenient"]), 2, &["--script"]);
     refused(&run(&["--log", "loud"]), 2, &["loud", "warn"]);
     let script = folder.join("bad.txt");
-    std::fs::write(&script, "at 1: start\nat soon: stop\n").unwrap();
+    std::fs::write(&script, "> start\n[soon]\n").unwrap();
     let script = script.display().to_string();
-    refused(&run(&["--script", &script]), 2, &["line 2", "at soon: stop", "0 to 3600 s"]);
+    refused(&run(&["--script", &script]), 2, &["line 2", "[soon]", "no such command"]);
     assert!(std::fs::read_dir(&folder).unwrap().count() == 2, "no page is written");
 
     // The limit allows reading the ELF, but not opening both ends of a pseudo-terminal. It also holds if a terminal

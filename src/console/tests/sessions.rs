@@ -4,6 +4,7 @@ use std::fs;
 use std::mem::take;
 
 use drive_core::Coefficients;
+use hil_sim::sessions;
 
 use super::announcements::{STATES, in_state};
 use super::*;
@@ -11,6 +12,9 @@ use crate::generated;
 use crate::modbus::settings::{Baud, Format};
 use crate::modbus::tests::beside_console::Both;
 use crate::terminals::Contacts;
+
+#[path = "../../../tests/sessions/played.rs"]
+mod played;
 
 /// A drive with its user, bus master and terminals, and the state that is shown when it changes.
 struct Player {
@@ -266,57 +270,7 @@ fn configured(with: &Coefficients, in_force: &FirmwareSettings) -> String {
 
 /// A time in milliseconds, from `2 s` or `150 ms`.
 fn ms(time: &str) -> Option<u32> {
-    let (number, unit) = time.split_once(' ')?;
-    let factor = [("s", 1e3), ("ms", 1.0)].into_iter().find(|(name, _)| *name == unit)?.1;
-    Some((number.parse::<f64>().ok()? * factor).round() as u32)
-}
-
-/// Whether lines are as written: `~ ` before a part of a line, `...` for any number of lines.
-fn is_as_written(written: &[&str], lines: &[String]) -> bool {
-    match written.split_first() {
-        None => lines.is_empty(),
-        Some((&"...", rest)) => (0..=lines.len()).any(|n| is_as_written(rest, &lines[n..])),
-        Some((one, rest)) => lines.split_first().is_some_and(|(line, others)| {
-            let right = one.strip_prefix("~ ").map_or(*one == line, |part| line.contains(part));
-            right && is_as_written(rest, others)
-        }),
-    }
-}
-
-/// Plays a session; returns it with the answers of the drive, and the first difference.
-fn played(session: &str) -> (String, Option<String>) {
-    let (mut player, mut text, mut wrong) = (Player::new(""), String::new(), None);
-    let is_input = |line: &str| line.starts_with(['>', '[']) || line.starts_with("bus> ");
-    let mut lines = session.lines().enumerate().peekable();
-    while let Some((number, line)) = lines.next() {
-        text += &format!("{line}\n");
-        if !is_input(line) {
-            assert!(
-                line.is_empty() || line.starts_with('#'),
-                "{number}: not behind a request: {line}"
-            );
-            continue;
-        }
-        let mut written = Vec::new();
-        let is_answer = |line: &str| !is_input(line) && !line.is_empty() && !line.starts_with('#');
-        while let Some((_, line)) = lines.next_if(|(_, line)| is_answer(line)) {
-            written.push(line);
-        }
-        let said = player.play(line);
-        let right = is_as_written(&written, &said);
-        let lines = if right { written.join("\n") } else { said.join("\n") };
-        if !right {
-            let number = number + 1;
-            let written = written.join("\n");
-            wrong.get_or_insert(format!(
-                "line {number}: {line}\nis answered:\n{lines}\nand not:\n{written}"
-            ));
-        }
-        if !lines.is_empty() {
-            text += &format!("{lines}\n");
-        }
-    }
-    (text, wrong)
+    sessions::seconds(time).map(|seconds| (seconds * 1e3).round() as u32)
 }
 
 #[test]
@@ -329,17 +283,9 @@ fn sessions_are_as_written() {
         }
         // Shown if a line cannot be played.
         println!("{}", path.display());
-        let (text, wrong) = played(&fs::read_to_string(&path).unwrap());
-        if let Some(wrong) = wrong {
-            if std::env::var_os("WRITE_SESSIONS").is_some() {
-                fs::write(&path, text).unwrap();
-            } else {
-                all_wrong += &format!("{}, {wrong}\n\n", path.display());
-            }
-        }
+        let mut player = Player::new("");
+        let wrong = played::difference(&path, |line| Ok(player.play(line))).unwrap();
+        all_wrong += &wrong.unwrap_or_default();
     }
-    assert!(
-        all_wrong.is_empty(),
-        "{all_wrong}`WRITE_SESSIONS=1` before the command writes the answers"
-    );
+    assert!(all_wrong.is_empty(), "{all_wrong}");
 }

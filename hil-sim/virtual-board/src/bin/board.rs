@@ -44,8 +44,8 @@ fn run(mut options: Options) -> Result<()> {
     stage.suit(&mut options.input);
     let options = &options;
     let config = options.config()?;
-    let script = options.script.as_deref().map(Script::open).transpose()?;
-    let script = script.map(|script| if options.lenient { script } else { script.strict() });
+    let script = options.script.as_deref().map(|path| Script::open(path, !options.lenient));
+    let script = script.transpose()?;
     let image = image(stage, options.elf.as_deref())?;
     let (pty, bus) = (Pty::open()?, Pty::open()?);
     let stop = Arc::new(AtomicBool::new(false));
@@ -87,9 +87,10 @@ fn run(mut options: Options) -> Result<()> {
         flash,
         log: options.log,
         flux: options.attached,
+        show: |line| say(&line.to_string()),
     };
     let mut session = Session::new(board, pty, bus, inputs);
-    let end = session.run(|line| say(&line.to_string()));
+    let end = session.run();
     let path = write(options, &config, &session)?;
     say(&format!("Report: {}", path.display()));
     end

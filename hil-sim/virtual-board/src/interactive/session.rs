@@ -7,11 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail};
+use anyhow::{Result, ensure};
 use drive_stream::{Piece, Splitter};
 use hil_sim::{board::LogLevel, rig::RATE_HZ};
+use induction_drive::console::line::UNASKED;
 
-use super::script::{Due, Script};
+use super::script::{Script, Step, failure};
 use super::transcript::{Assembler, Line, Source};
 use super::{flash_file::FlashFile, own::Own, pty::Pty, record::Record};
 use crate::board::{Board, Period};
@@ -29,8 +30,13 @@ const LATE: Duration = Duration::from_millis(100);
 /// Time without a line after which a session without a person shows its time.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(10);
 
+/// Longest wait for the answer to a line of a script, s: more than twice that of the slowest answer.
+const ANSWER_S: f64 = 5.0;
+/// Time without a line after which an answer is complete, s: longer than any line takes on the wire.
+const SILENCE_S: f64 = 0.06;
 /// The reason why a session has ended, in words.
 type End = &'static str;
+const TIME_IS_OVER: End = "the time is over";
 
 /// Inputs of a session besides the pseudo-terminal.
 pub struct Inputs {
@@ -50,6 +56,8 @@ pub struct Inputs {
     pub log: LogLevel,
     /// Whether the flux is shown.
     pub flux: bool,
+    /// Gets every line when it comes.
+    pub show: fn(&Line),
 }
 
 /// A board with its inputs and outputs.
@@ -59,22 +67,38 @@ pub struct Session {
     pty: Pty,
     bus: Pty,
     inputs: Inputs,
+    seen: Seen,
+    /// Dc-link voltage at the beginning, V.
+    dc_link_v: f64,
+    /// All lines so far, and how many of them were shown at which time.
+    pub lines: Vec<Line>,
+    shown: (usize, Instant),
+    /// Time of the clock at a simulated time, s.
+    clock: (Instant, f64),
+    /// All curves so far.
+    pub record: Record,
+    /// Delay of the board behind the clock, s.
+    pub behind_s: f64,
+}
+
+/// State of the inputs and outputs of a session.
+#[derive(Default)]
+struct Seen {
     typed: Assembler,
     said: Assembler,
     /// Separates the frames of a stream.
     wire: Splitter,
     resets: usize,
+    /// Whether any gate was on in the last period, and the names of the active outputs of the terminal strip.
+    gates_on: bool,
+    outputs: String,
     last: Option<Period>,
-    /// Dc-link voltage at the beginning, V.
-    dc_link_v: f64,
     /// The drive's flux angle, the motor's, turns, and the motor's flux, Wb, in the last period.
     flux: Option<[f64; 3]>,
-    /// All lines so far.
-    pub lines: Vec<Line>,
-    /// All curves so far.
-    pub record: Record,
-    /// Delay of the board behind the clock, s.
-    pub behind_s: f64,
+    /// The text that a script waits for, and whether it has come.
+    awaited: Option<String>,
+    has_come: bool,
+    end: Option<End>,
 }
 
 impl Session {
@@ -82,65 +106,149 @@ impl Session {
     pub fn new(board: Board, pty: Pty, bus: Pty, inputs: Inputs) -> Self {
         Self {
             dc_link_v: board.plant.dc_link(),
+            clock: (Instant::now(), board.time()),
             board,
             pty,
             bus,
             inputs,
-            typed: Assembler::default(),
-            said: Assembler::default(),
-            wire: Splitter::default(),
-            resets: 0,
-            last: None,
-            flux: None,
+            seen: Seen::default(),
             lines: Vec::new(),
+            shown: (0, Instant::now()),
             record: Record::default(),
             behind_s: 0.0,
         }
     }
 
-    /// Runs until something ends the session; `show` gets every line when it comes.
+    /// Runs until something ends the session.
     ///
     /// # Errors
     /// The board or the script cannot continue.
-    pub fn run(&mut self, mut show: impl FnMut(&Line)) -> Result<()> {
-        let (mut clock, mut since) = (Instant::now(), self.board.time());
-        let mut said = Instant::now();
-        let alone = self.inputs.script.is_some() || !self.inputs.paced;
-        let end = loop {
-            let shown = self.lines.len();
-            let end = self.slice();
-            self.lines[shown..].iter().for_each(&mut show);
-            if let Some(end) = end.transpose() {
-                break end;
-            }
-            if self.lines.len() > shown {
-                said = Instant::now();
-            } else if alone && said.elapsed() >= SIGN_OF_LIFE {
-                said = Instant::now();
-                let text = "simulating".to_owned();
-                show(&Line { time: self.board.time(), source: Source::Board, text });
-            }
-            if self.inputs.paced {
-                let due = Duration::from_secs_f64(self.board.time() - since);
-                let passed = clock.elapsed();
-                if passed > due + LATE {
-                    self.behind_s += (passed - due).as_secs_f64();
-                    (clock, since) = (Instant::now(), self.board.time());
-                }
-                std::thread::sleep(due.saturating_sub(passed));
-            }
-        };
+    pub fn run(&mut self) -> Result<()> {
+        let end = self.until_end();
         // The flash may have changed in the last slice.
         let end = self.keep_flash().and(end);
-        let shown = self.lines.len();
-        for (rest, source) in [(self.typed.rest(), Source::Typed), (self.said.rest(), Source::Said)]
+        for (rest, source) in
+            [(self.seen.typed.rest(), Source::Typed), (self.seen.said.rest(), Source::Said)]
         {
             rest.into_iter().for_each(|text| self.add(source, text));
         }
         let why = end.as_ref().map_or_else(|error| format!("{error:#}"), |end| (*end).to_owned());
         self.add(Source::Board, format!("end: {why}"));
-        self.lines[shown..].iter().for_each(&mut show);
+        self.show();
         end.map(drop)
+    }
+
+    /// Plays the script, if there is one, and runs to the end.
+    fn until_end(&mut self) -> Result<End> {
+        if let Some(script) = self.inputs.script.clone() {
+            self.follow(&script)?;
+        }
+        loop {
+            if let Some(end) = self.seen.end {
+                return Ok(end);
+            }
+            self.turn()?;
+        }
+    }
+
+    /// Plays a script; a strict one fails at the first wrong answer.
+    fn follow(&mut self, script: &Script) -> Result<()> {
+        for (step, exchange) in &script.lines {
+            let said = self.play(step)?;
+            let is_cut_short = self.seen.end == Some(TIME_IS_OVER);
+            let wrong = failure(exchange, &said).or(is_cut_short.then(|| TIME_IS_OVER.to_owned()));
+            if let Some(why) = wrong {
+                let why =
+                    format!("script, line {}: `{}`: {why}", exchange.number, exchange.request);
+                ensure!(!script.strict, why);
+                self.add(Source::Board, why);
+            }
+            if self.seen.end.is_some() {
+                return Ok(());
+            }
+        }
+        // If the session has a time, it ends later.
+        let ends = script.quits || self.inputs.seconds.is_none();
+        self.seen.end = ends.then_some(if script.quits { "quit" } else { "of the script" });
+        Ok(())
+    }
+
+    /// Plays a step of a script; returns the lines that the drive says meanwhile, and behind `-> ` those of the board.
+    ///
+    /// # Errors
+    /// The board cannot continue.
+    pub fn play(&mut self, step: &Step) -> Result<Vec<String>> {
+        let (from, began) = (self.lines.len(), self.board.time());
+        (self.seen.awaited, self.seen.has_come) = (None, false);
+        match step {
+            Step::Ask(line) | Step::Type(line) => self.type_line(line),
+            Step::Own(own) => self.carry_out(own)?,
+            Step::Until(_, text) => self.seen.awaited = Some(text.clone()),
+            Step::Pass(_) => {}
+        }
+        while self.seen.end.is_none() {
+            let (now, since) = (self.board.time(), &self.lines[from..]);
+            let passed = now - began;
+            let is_over = match step {
+                Step::Type(_) => true,
+                Step::Own(_) => passed > 0.0,
+                Step::Pass(seconds) => passed >= *seconds,
+                Step::Until(within, _) => self.seen.has_come || passed > *within,
+                Step::Ask(line) => {
+                    let answers = |line: &Line| {
+                        line.source == Source::Said && !line.text.starts_with(UNASKED)
+                    };
+                    let last = since.last().map_or(began, |line| line.time);
+                    let is_answered = line.is_empty() || since.iter().any(answers);
+                    is_answered && now > last + SILENCE_S || passed > ANSWER_S
+                }
+            };
+            if is_over {
+                break;
+            }
+            self.turn()?;
+        }
+        if let (Step::Until(within, text), false) = (step, self.seen.has_come) {
+            self.add(Source::Board, format!("nothing said `{text}` within {within} s"));
+        }
+        let said = self.lines[from..].iter().filter_map(|line| match line.source {
+            Source::Said => Some(line.text.clone()),
+            Source::Board => Some(format!("-> {}", line.text)),
+            Source::Typed | Source::Log => None,
+        });
+        Ok(said.collect())
+    }
+
+    /// Runs for a slice, and waits for the clock.
+    fn turn(&mut self) -> Result<()> {
+        let end = self.slice();
+        self.show();
+        self.seen.end = end?;
+        if self.inputs.paced {
+            let (clock, since) = self.clock;
+            let due = Duration::from_secs_f64(self.board.time() - since);
+            let passed = clock.elapsed();
+            if passed > due + LATE {
+                self.behind_s += (passed - due).as_secs_f64();
+                self.clock = (Instant::now(), self.board.time());
+            }
+            std::thread::sleep(due.saturating_sub(passed));
+        }
+        Ok(())
+    }
+
+    /// Shows the new lines, or the time if there was none for long.
+    fn show(&mut self) {
+        let (shown, at) = self.shown;
+        let alone = self.inputs.script.is_some() || !self.inputs.paced;
+        if self.lines.len() > shown {
+            self.lines[shown..].iter().for_each(self.inputs.show);
+            self.shown = (self.lines.len(), Instant::now());
+        } else if alone && at.elapsed() >= SIGN_OF_LIFE {
+            self.shown.1 = Instant::now();
+            let text = "simulating".to_owned();
+            (self.inputs.show)(&Line { time: self.board.time(), source: Source::Board, text });
+        }
     }
 
     /// Reads the inputs, runs for a slice and shows the outputs; returns the reason of the end, if the session ends.
@@ -150,10 +258,7 @@ impl Session {
             return Ok(Some("interrupted"));
         }
         if self.inputs.seconds.is_some_and(|seconds| now >= seconds) {
-            if let Some(why) = self.inputs.script.as_mut().and_then(Script::cut_short) {
-                bail!(why);
-            }
-            return Ok(Some("the time is over"));
+            return Ok(Some(TIME_IS_OVER));
         }
         let typed = self.pty.read()?;
         self.send(&typed);
@@ -161,28 +266,18 @@ impl Session {
         self.board.send_bus(&asked);
         // If the terminal is closed, script and pseudo-terminal continue.
         while let Ok(line) = self.inputs.terminal.try_recv() {
-            if let Some(end) = self.enter(&line)? {
-                return Ok(Some(end));
-            }
-        }
-        if let Some(script) = &mut self.inputs.script {
-            match script.due(now)? {
-                Due::Type(line) => {
-                    if let Some(end) = self.enter(&line)? {
-                        return Ok(Some(end));
-                    }
-                }
-                Due::Note(text) => self.add(Source::Board, text),
-                // If the session has a time, it ends later.
-                Due::End if self.inputs.seconds.is_none() => return Ok(Some("of the script")),
-                Due::End | Due::Nothing => {}
+            match Own::parse(&line) {
+                Ok(None) => self.type_line(&line),
+                Ok(Some(Own::Quit)) => return Ok(Some("quit")),
+                Ok(Some(own)) => self.carry_out(&own)?,
+                Err(why) => self.add(Source::Board, format!("error: {why}")),
             }
         }
         // The loader's answers are awaited.
         let slice = if self.board.loader.is_some() { SLICE / 10 } else { SLICE };
         let went = (0..slice).try_for_each(|_| self.period());
         self.hear()?;
-        if let Some([drive, motor, flux]) = self.flux.take().filter(|_| self.inputs.flux) {
+        if let Some([drive, motor, flux]) = self.seen.flux.take().filter(|_| self.inputs.flux) {
             // A reader that has gone away does not stop the session.
             let _ = writeln!(std::io::stdout(), "flux {drive:.4} {motor:.4} {flux:.3}");
         }
@@ -190,27 +285,27 @@ impl Session {
         went.map(|()| None)
     }
 
-    /// Executes a command of the board, or sends the line to the console; returns the reason of the end, if the session ends.
-    fn enter(&mut self, line: &str) -> Result<Option<End>> {
-        match Own::parse(line) {
-            Ok(None) => {
-                self.send(line.as_bytes());
-                self.send(b"\n");
-            }
-            Err(why) => self.add(Source::Board, format!("error: {why}")),
-            Ok(Some(Own::Quit)) => return Ok(Some("quit")),
-            Ok(Some(Own::Help)) => Own::help().for_each(|line| self.add(Source::Board, line)),
-            Ok(Some(Own::Reset)) => self.board.reset(Reset::Pin),
-            Ok(Some(Own::Unplug)) => self.board.unplug(),
-            Ok(Some(Own::Wires(wires))) => {
-                let set = self.board.set_wires(&wires);
+    fn type_line(&mut self, line: &str) {
+        self.send(line.as_bytes());
+        self.send(b"\n");
+    }
+
+    /// Executes a command of the board.
+    fn carry_out(&mut self, own: &Own) -> Result<()> {
+        match own {
+            Own::Quit => self.seen.end = Some("quit"),
+            Own::Help => Own::help().for_each(|line| self.add(Source::Board, line)),
+            Own::Reset => self.board.reset(Reset::Pin),
+            Own::Unplug => self.board.unplug(),
+            Own::Wires(wires) => {
+                let set = self.board.set_wires(wires);
                 set.err().into_iter().for_each(|why| self.add(Source::Board, why.to_string()));
             }
-            Ok(Some(Own::Stage(on))) => {
-                self.board.supply_stage(on, if on { self.dc_link_v } else { 1.0 })?;
+            Own::Stage(on) => {
+                self.board.supply_stage(*on, if *on { self.dc_link_v } else { 1.0 })?;
             }
         }
-        Ok(None)
+        Ok(())
     }
 
     fn keep_flash(&mut self) -> Result<()> {
@@ -225,7 +320,7 @@ impl Session {
             if self.board.loader.is_some() {
                 return;
             }
-            for line in self.typed.push(bytes) {
+            for line in self.seen.typed.push(bytes) {
                 // If the person asks for more of the log, it is shown.
                 let level = line.trim().strip_prefix("log ").and_then(LogLevel::named);
                 self.inputs.log = level.unwrap_or(self.inputs.log);
@@ -237,18 +332,24 @@ impl Session {
     /// Runs until just before the next control interrupt.
     fn period(&mut self) -> Result<()> {
         let now = self.board.chip().now;
-        let next = self.last.map_or(0, |period| period.began + 2 * PERIOD - BEFORE);
+        let next = self.seen.last.map_or(0, |period| period.began + 2 * PERIOD - BEFORE);
         // Without control interrupts (start, resets), one period at a time.
         let end = if (now + 1..now + 2 * PERIOD).contains(&next) { next } else { now + PERIOD };
         self.board.run_ticks(end - now)?;
+        let gates_on = self.board.gates().any_on();
+        if gates_on != self.seen.gates_on {
+            self.seen.gates_on = gates_on;
+            self.add(Source::Board, if gates_on { "gates: on" } else { "gates: off" }.to_owned());
+        }
         while let Some(period) = self.board.next_period() {
             let drive = self.board.telemetry();
             let time = period.began as f64 / TICKS_PER_S as f64;
             let truth =
                 [self.board.plant.rotor_flux_angle() / TAU, self.board.plant.rotor_flux().norm()];
-            self.flux = Some([f64::from(drive.phi.to_turns()).rem_euclid(1.0), truth[0], truth[1]]);
+            self.seen.flux =
+                Some([f64::from(drive.phi.to_turns()).rem_euclid(1.0), truth[0], truth[1]]);
             self.record.take(time, &self.board.plant, &period, &drive);
-            self.last = Some(period);
+            self.seen.last = Some(period);
         }
         Ok(())
     }
@@ -258,21 +359,29 @@ impl Session {
         for text in self.board.take_log()? {
             self.add(Source::Log, text);
         }
-        for n in self.resets..self.board.resets.len() {
-            self.resets = n + 1;
+        for n in self.seen.resets..self.board.resets.len() {
+            self.seen.resets = n + 1;
             let cause = self.board.resets[n].1;
             self.add(Source::Board, cause.to_string());
             // A frame that the reset cut short must not swallow text.
-            self.wire = Splitter::default();
+            self.seen.wire = Splitter::default();
+        }
+        let active = ["RUN", "FAULT", "BRAKE"].into_iter().zip(self.board.terminal_outputs());
+        let outputs: String =
+            active.filter(|(_, on)| *on).map(|(name, _)| format!(" {name}")).collect();
+        if outputs != self.seen.outputs {
+            let names = if outputs.is_empty() { " none" } else { &outputs };
+            self.add(Source::Board, format!("outputs:{names}"));
+            self.seen.outputs = outputs;
         }
         let bytes = self.board.chip().lpuart.line.take();
-        let text = |byte: &u8| match self.wire.push(*byte) {
+        let text = |byte: &u8| match self.seen.wire.push(*byte) {
             Piece::Text(byte) => Some(byte),
             _ => None,
         };
         let text: Vec<u8> = bytes.iter().filter_map(text).collect();
         let text = if self.board.loader.is_some() { Vec::new() } else { text };
-        for line in self.said.push(&text) {
+        for line in self.seen.said.push(&text) {
             let begun = line.split_once("ok: every ").and_then(|(_, rest)| rest.split(' ').next());
             let rate = begun.and_then(|periods| periods.parse::<f64>().ok()).map(|n| RATE_HZ / n);
             self.add(Source::Said, line);
@@ -286,11 +395,9 @@ impl Session {
     }
 
     fn add(&mut self, source: Source, text: String) {
-        if let Some(script) = &mut self.inputs.script
-            && matches!(source, Source::Said | Source::Log)
-        {
-            script.hear(&text);
-        }
+        let is_heard = source != Source::Typed;
+        self.seen.has_come |=
+            is_heard && self.seen.awaited.as_ref().is_some_and(|awaited| text.contains(awaited));
         if source == Source::Log && log_level(&text) > self.inputs.log {
             return;
         }

@@ -53,10 +53,15 @@ impl Line {
             Source::Typed if references && REFERENCES.contains(&first) => Some(text),
             Source::Board if text.starts_with("reset") => Some(text),
             Source::Log => text.strip_prefix("ERROR ").filter(|text| is_fault(text)),
-            Source::Said => text.strip_prefix(UNASKED).filter(|text| is_fault(text)),
+            Source::Said => fault(text),
             _ => None,
         }
     }
+}
+
+/// Returns the report of a fault in a line that the console says unrequested.
+pub fn fault(line: &str) -> Option<&str> {
+    line.strip_prefix(UNASKED).filter(|text| is_fault(text))
 }
 
 /// Whether a text is the report of a fault: `fault NUMBER: MEANING`.
