@@ -3,30 +3,12 @@
 use crate::common;
 use anyhow::{Context, Result};
 use drive_core::State;
-use hil_sim::Config;
 use virtual_board::cpu::Register;
 use virtual_board::memory;
 use virtual_board::periph::Reset;
-use virtual_board::{Board, Image, Options};
-
-/// Largest number of periods that the firmware needs from reset to its greeting.
-const START: u64 = 15_000;
 
 /// Number of periods between two reports of the control to the console.
 const REPORT: u64 = 601;
-
-#[test]
-fn it_starts_says_who_it_is_and_stays_off() -> Result<()> {
-    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 1))?;
-    common::until_said(&mut board, "last run: reset by power-on")?;
-    let log = board.take_log()?;
-    assert!(log.iter().any(|line| line.contains("reset by power-on")), "{log:#?}");
-    assert!(log.iter().any(|line| line.contains("state: off")), "{log:#?}");
-    assert!(!log.iter().any(|line| line.starts_with("ERROR")), "{log:#?}");
-    assert!(!board.chip().tim1.outputs_on());
-    assert!(board.resets.is_empty());
-    Ok(())
-}
 
 /// The window watchdog resets a hanging core, which switches the outputs off; the motor is not harmed, and the next run
 /// reports the reason.
@@ -113,28 +95,6 @@ fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
     common::until_said(&mut pair.board, "clock or flash failure")?;
     let log = pair.board.take_log()?;
     assert!(log.iter().any(|line| line.contains("internal oscillator")), "{log:#?}");
-    Ok(())
-}
-
-/// If a timer never triggers the ADCs, there is one check at start and no repeated reset, and the console reports that
-/// the drive does not run.
-#[test]
-fn without_the_control_interrupt_it_stays_off() -> Result<()> {
-    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 5))?;
-    board.chip().adc.lose_triggers = [u32::MAX; 2];
-    board.run_periods(START)?;
-    let heard = board.take_console();
-    assert!(heard.contains("last run: reset by power-on"), "{heard}");
-    let log = board.take_log()?;
-    assert!(
-        log.iter().any(|line| line.contains("not started") && line.contains("control interrupt")),
-        "{log:#?}"
-    );
-    board.type_line("start");
-    board.run_periods(2 * START)?;
-    let heard = board.take_console();
-    assert!(heard.contains("error: the control does not run"), "{heard}");
-    assert!(!board.chip().tim1.outputs_on() && board.resets.is_empty(), "{:?}", board.resets);
     Ok(())
 }
 

@@ -12,13 +12,11 @@ use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, CODES, REFERENCE_V, channel};
 use virtual_board::{Board, Image, Options, Pair, PowerStage};
 
-use crate::common::{off_for, say, until_said as said};
+use crate::common::off_for;
 
 /// An action that ends a run.
 type End<'a> = &'a dyn Fn(&mut Board) -> Result<()>;
 
-/// Largest number of periods from a reset to the greeting.
-const START: u64 = 30_000;
 /// Number of periods between two reports of the control to the console.
 const REPORT: u64 = 601;
 
@@ -109,92 +107,6 @@ fn the_firmware_and_the_power_stage_agree() {
             _ => panic!("{name}: sensors of different kinds"),
         }
     }
-}
-
-/// From power-up to the greeting and after it, a board whose bench steps were not confirmed refuses to start, and its
-/// drivers are off.
-#[test]
-fn a_fresh_board_is_off_and_does_not_start() -> Result<()> {
-    for stage in ALL {
-        let mut options = Options::on(stage, &stage.config()?, 2);
-        options.confirmed = false;
-        let mut board = Board::new(Image::built_for(stage.name)?, options)?;
-        let mut heard = String::new();
-        while !heard.contains("last run: ") {
-            off_for(&mut board, 100)?;
-            heard += &board.take_console();
-            assert!(board.time() < START as f64 / 6000.0, "{heard}");
-        }
-        board.run_periods(600)?;
-        board.take_console();
-        board.type_line("start torque");
-        off_for(&mut board, 1200)?;
-        let heard = board.take_console();
-        assert!(heard.contains("error: ") && heard.contains("confirm board"), "{heard}");
-        assert!(board.resets.is_empty() && board.violations().is_empty());
-    }
-    Ok(())
-}
-
-/// The image of each board on each other board, with the settings of that board saved and confirmed, and on a blank
-/// one: no gate is on, because the pins stay as after a reset, and the console names both boards and the remedies.
-#[test]
-fn the_image_of_another_board_drives_no_gate() -> Result<()> {
-    for (n, stage) in ALL.into_iter().enumerate() {
-        for of in ALL {
-            let mut options = Options::on(stage, &stage.config()?, 3);
-            options.confirmed = of.name != stage.name;
-            let mut board = Board::new(Image::built_for(of.name)?, options)?;
-            off_for(&mut board, 3000)?;
-            assert!(board.resets.is_empty() && board.violations().is_empty(), "{}", of.name);
-            // The messages to the user, with one third-party image for each board.
-            if of.name != ALL[(n + 1) % ALL.len()].name {
-                continue;
-            }
-            said(&mut board, "last run: ")?;
-            for line in ["start vf", "confirm board"] {
-                let answer = say(&mut board, line, "error: ")?;
-                let names = format!("for the board {}, ", of.name);
-                let theirs = format!("flash the image of {}", stage.name);
-                assert!(answer.contains(&names) && answer.contains(&theirs), "{answer}");
-                assert!(answer.contains("`defaults`"), "{answer}");
-            }
-            off_for(&mut board, 600)?;
-        }
-    }
-    Ok(())
-}
-
-/// `confirm board` connects the gates of a blank board and drives them to off; they stay connected over a reset.
-#[test]
-fn a_confirmation_connects_the_gates() -> Result<()> {
-    for stage in ALL {
-        let mut options = Options::on(stage, &stage.config()?, 4);
-        options.confirmed = false;
-        let mut board = Board::new(Image::built_for(stage.name)?, options)?;
-        said(&mut board, "last run: ")?;
-        let firmware = stage.board();
-        let connected = |board: &mut Board| {
-            let pins = firmware.high.pins.into_iter().chain(firmware.low.pins);
-            let modes: Vec<_> = pins
-                .map(|pin| {
-                    let mode = board.chip().gpio[pin.port as usize].read(0).unwrap_or(0);
-                    mode >> (2 * pin.number) & 3
-                })
-                .collect();
-            modes.iter().all(|mode| *mode == 2)
-        };
-        assert!(!connected(&mut board), "{}", stage.name);
-        say(&mut board, "confirm board", "ok")?;
-        assert!(connected(&mut board), "{}", stage.name);
-        // The check of the registers goes through all of them.
-        off_for(&mut board, 1200)?;
-        board.reset(Reset::Pin);
-        said(&mut board, "last run: ")?;
-        assert!(connected(&mut board) && !board.gates().any_on(), "{}", stage.name);
-        assert!(board.violations().is_empty());
-    }
-    Ok(())
 }
 
 /// The check of the wiring, and steps of the torque with the encoder at 300 rpm: the motor's true torque equals the

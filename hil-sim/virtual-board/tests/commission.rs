@@ -116,22 +116,6 @@ fn random_machines_are_commissioned_by_the_image() {
     assert!(worst[most] < 1.5 && worst.iter().all(|error| *error < 3.0), "{worst:?}");
 }
 
-#[test]
-fn a_stop_or_a_new_setting_leaves_everything_as_it_was() -> Result<()> {
-    let config = drawn(&Config::default(), 7);
-    let mut console = Console::new(&config, 7)?;
-    let before = in_force(&mut console)?;
-    console.say("commission", "wiring: sound")?;
-    console.board.run_periods(6000)?;
-    let told = console.say("stop", "commissioning: ended")?;
-    assert!(told.contains("levels: refused") && told.contains("as they were"), "{told}");
-    assert!(console.say("accept", "\n")?.contains("commission"), "nothing to accept");
-    assert!(console.say("status", "\n")?.starts_with("off"));
-    let after = in_force(&mut console)?;
-    assert_eq!(before.values().map(|(_, x)| x), after.values().map(|(_, x)| x));
-    Ok(())
-}
-
 /// The searches take most of the time of the watchdog, so a host that sends many lines must not add to it. (Once this
 /// reset the chip while the outputs were on.)
 #[test]
@@ -153,74 +137,5 @@ fn a_host_that_says_much_resets_nothing() -> Result<()> {
     assert!(told.contains("levels: sound"), "{told}");
     let log = console.board.take_log()?;
     assert!(!log.iter().any(|line| line.contains("watchdog")), "{log:#?}");
-    Ok(())
-}
-
-#[test]
-fn the_image_finds_the_inertia_with_a_free_shaft() -> Result<()> {
-    let mut config = Config::default();
-    config.load.mode = hil_sim::config::LoadMode::Free;
-    config.motor.inertia = 0.02;
-    let mut console = Console::new(&config, 3)?;
-    let told = console.say("commission inertia", "commissioning: ended")?;
-    assert!(told.contains("the shaft is going to turn") && told.contains("exchange two"), "{told}");
-    console.say("accept", "\nok")?;
-    let inertia = value(&mut console, "motor.inertia")?;
-    assert!((inertia / 0.02 - 1.0).abs() < 0.05, "{inertia}");
-    // The drive has turned the shaft, which is at rest again with the outputs off.
-    assert!(console.say("status", "\n")?.starts_with("off"));
-    Ok(())
-}
-
-#[test]
-fn the_image_identifies_the_plants_of_the_current_loop_on_request() -> Result<()> {
-    let mut config = Config::default();
-    config.load.mode = hil_sim::config::LoadMode::Locked;
-    let mut console = Console::new(&config, 4)?;
-    console.say("commission nameplate leakage", "commissioning: ended")?;
-    let told = console.say("commission plant", "commissioning: ended")?;
-    assert!(
-        told.contains("phase margin by rule 3.8 across") && told.contains("plant: sound"),
-        "{told}"
-    );
-    assert!(console.say("get current_plant", "current_plant")?.contains("motor"), "not accepted");
-    console.say("accept", "\nok")?;
-    // (1 - exp(-R T/L))/R with Table 5. On the board the edges of the inverter are real.
-    for key in ["current_plant.d.k", "current_plant.q.k"] {
-        let k = value(&mut console, key)?;
-        assert!((k / 0.0032 - 1.0).abs() < 0.1, "{key}: {k}");
-    }
-    Ok(())
-}
-
-/// The session of the manual, from the nameplate to torque; with `--nocapture` it prints the output of the console.
-#[test]
-fn the_image_goes_from_the_nameplate_to_torque() -> Result<()> {
-    let mut config = Config::default();
-    config.load.mode = hil_sim::config::LoadMode::Locked;
-    let mut console = Console::new(&config, 1)?;
-    for (line, until) in [
-        ("commission", "commissioning: ended"),
-        ("accept", "\nok"),
-        ("learn", "off: the learning has ended"),
-        ("save", "ok"),
-        ("start", "running: torque"),
-        ("torque 1", "ok"),
-    ] {
-        let began = console.board.time();
-        let said = console.say(line, until)?;
-        let seconds = console.board.time() - began;
-        println!("{line}\n{said}({seconds:.0} s)");
-        if line == "commission" {
-            assert!(said.contains("then lock the shaft and `learn`"), "{said}");
-        }
-        if line == "learn" {
-            // 0.707 of the 3.27 A that the sensors leave for both currents: 3/2 P L_M i_d i_q = 2.46 Nm.
-            assert!(said.contains("learned: trackable from -2.4"), "{said}");
-            assert!(said.contains("the range of the sensors"), "{said}");
-            // The duration with 14 currents, up to the limit.
-            assert!(seconds < 80.0, "{seconds} s");
-        }
-    }
     Ok(())
 }

@@ -183,17 +183,6 @@ fn the_chopper_survives_a_dip_of_the_supply() -> Result<()> {
     Ok(())
 }
 
-/// A drive without a brake resistor does not need the chopper.
-#[test]
-fn without_a_resistor_a_lost_chopper_stops_nothing() -> Result<()> {
-    let mut pair = braked(|_| {}, &["set braking.ohm 0", "apply", "start torque"])?;
-    pair.until_state(State::Torque)?;
-    pair.board.chip().tim8.system_break();
-    pair.run(600, |_, _| {})?;
-    assert_eq!(pair.shadow.drive.state(), State::Torque);
-    Ok(())
-}
-
 /// A power failure has torn a word of the history: reading it at the next start is an error of the flash, which is tolerated.
 #[test]
 fn the_chopper_survives_a_torn_word_of_the_history() -> Result<()> {

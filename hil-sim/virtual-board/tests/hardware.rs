@@ -19,26 +19,6 @@ fn board(stage: &'static PowerStage) -> Result<Board> {
     Ok(board)
 }
 
-const REFUSED: &str =
-    "error: the board's polarities, dead time and scales are assumed, or were changed";
-
-/// The scale is in force and saved, and the board must be confirmed again with it.
-#[test]
-fn a_changed_scale_is_confirmed_before_a_start() -> Result<()> {
-    let mut board = board(&REFERENCE)?;
-    let gain = 1.1 * REFERENCE.firmware_settings().scales.current_b.gain;
-    ask(&mut board, &format!("set scales.current_b.gain {gain}"), "ok: staged; ")?;
-    let said = ask(&mut board, "save", "ok\r\n")?;
-    assert!(said.contains("the board has to be confirmed again"), "{said}");
-    board.reset(Reset::Pin);
-    self::said(&mut board, "last run: ")?;
-    ask(&mut board, "start torque", REFUSED)?;
-    assert!(!board.gates().any_on());
-    ask(&mut board, "confirm board", "ok")?;
-    ask(&mut board, "start torque", "ok")?;
-    Ok(())
-}
-
 /// Returns the gates that are requested on, or may be, of a chip that stands still.
 fn gates_on(board: &mut Board) -> Vec<String> {
     let chip = board.chip();
@@ -87,46 +67,6 @@ fn the_boot_loader_drives_gates_unless_the_option_bytes_leave_it_out() -> Result
             said(&mut board, "last run: ")?;
             assert_eq!(gates_on(&mut board), [""; 0], "{}", stage.name);
         }
-    }
-    Ok(())
-}
-
-/// The console reports whether the boot pin has an effect, with the command that disables it, and the confirmation applies to that state.
-#[test]
-fn the_option_bytes_are_part_of_what_is_confirmed() -> Result<()> {
-    let mut board = board(&REFERENCE)?;
-    let said = ask(&mut board, "board", "confirmed\r\nok")?;
-    assert!(said.contains("boot pin: PB8 high at a reset"), "{said}");
-    assert!(said.contains("-ob nSWBOOT0=0 nBOOT0=1"), "{said}");
-    ask(&mut board, "confirm board", "ok: with the boot pin in use")?;
-    board.chip().flash.options &= !N_SWBOOT0;
-    board.reset(Reset::Pin);
-    self::said(&mut board, "last run: ")?;
-    let said = ask(&mut board, "board", "not confirmed")?;
-    assert!(said.contains("boot pin: not in use"), "{said}");
-    ask(&mut board, "start torque", REFUSED)?;
-    let said = ask(&mut board, "confirm board", "ok")?;
-    assert!(!said.contains("boot pin"), "{said}");
-    ask(&mut board, "start torque", "ok")?;
-    Ok(())
-}
-
-/// Against the strongest pull of the chip, which the image sets towards a trip, the resistor of the stage gives a
-/// certain level. A weaker one does not, and the image takes this for a fault of the power stage: the drive stays off.
-#[test]
-fn the_fault_input_rests_at_a_sure_level() -> Result<()> {
-    const PULLED: &str = "the power stage pulls the break input";
-    for (ohm, sure) in [(4700.0, true), (12e3, false), (100e3, false)] {
-        let mut options = Options::on(&REFERENCE, &REFERENCE.config()?, 5);
-        options.fault_pull_ohm = ohm;
-        let mut board = Board::new(Image::built()?, options)?;
-        said(&mut board, "last run: ")?;
-        let log = board.take_log()?;
-        assert_eq!(log.iter().any(|line| line.contains(PULLED)), !sure, "{ohm}: {log:#?}");
-        assert_eq!(board.chip().gpio[0].pull(6), Some(false));
-        board.type_line("start torque");
-        board.run_periods(1200)?;
-        assert_eq!(board.gates().any_on(), sure, "{ohm}: {}", board.take_console());
     }
     Ok(())
 }

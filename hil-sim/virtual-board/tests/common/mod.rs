@@ -4,7 +4,6 @@ pub mod program;
 pub mod script;
 
 use anyhow::{Context as _, Result, bail, ensure};
-use drive_stream::client::{Answer, Client, Event};
 use hil_sim::Config;
 use virtual_board::{Board, Image, Options, Pair};
 
@@ -48,28 +47,6 @@ pub fn say(board: &mut Board, line: &str, until: &str) -> Result<String> {
     board.take_console();
     board.type_line(line);
     until_said(board, until).context(line.to_owned())
-}
-
-/// Returns the answer to a request.
-pub fn ask(board: &mut Board, line: &str) -> Result<Answer> {
-    let (mut client, mut answer) = (Client::default(), None);
-    board.send(client.ask(line).as_bytes());
-    for _ in 0..LONGEST / 60 {
-        board.run_periods(60)?;
-        while board.next_period().is_some() {}
-        let said = board.take_console();
-        for event in said.bytes().filter_map(|byte| client.push(byte)) {
-            if let Event::Answer(whole) = event {
-                answer = Some(whole);
-            }
-        }
-        if said.ends_with('\n')
-            && let Some(answer) = answer
-        {
-            return Ok(answer);
-        }
-    }
-    bail!("no answer to {line:?}")
 }
 
 /// Runs for some periods, and checks after each that every gate is off.
