@@ -95,16 +95,19 @@ fn a_motor_with_other_sensors_is_told_its_settings() {
 
 #[test]
 fn each_request_has_a_meaning() {
+    let typed = |line: &str| Step { typed: Some(line.to_owned()), ..Step::default() };
+    let own = |own| Step { own: Some(own), within: 1e-3, ..Step::default() };
+    let until = |text: &str, within| Step { until: Some(text.into()), within, ..Step::default() };
     for (line, expected) in [
-        ("> torque 1", Step::Ask("torque 1".into())),
-        (">", Step::Ask(String::new())),
-        (">> a: b", Step::Type("a: b".into())),
-        ("> !reset", Step::Own(Own::Reset)),
-        ("[stage: off]", Step::Own(Own::Stage(false))),
-        ("[wires: START 12]", Step::Own(Own::Wires("START 12".into()))),
-        ("[500 ms]", Step::Pass(0.5)),
-        ("[until: ok: 1]", Step::Until(30.0, "ok: 1".into())),
-        ("[until 2 s: ok]", Step::Until(2.0, "ok".into())),
+        ("> torque 1", Step { asks: true, within: 5.0, ..typed("torque 1") }),
+        (">", typed("")),
+        (">> a: b", typed("a: b")),
+        ("> !reset", own(Own::Reset)),
+        ("[stage: off]", own(Own::Stage(false))),
+        ("[wires: START 12]", own(Own::Wires("START 12".into()))),
+        ("[500 ms]", Step { within: 0.5, ..Step::default() }),
+        ("[until: ok: 1]", until("ok: 1", 30.0)),
+        ("[until 2 s: ok]", until("ok", 2.0)),
     ] {
         assert_eq!(Step::parse(line), Ok(expected), "{line}");
     }

@@ -26,25 +26,28 @@ use super::transcript::fault;
 /// Longest wait for a text, s, if the script states none.
 const PATIENCE_S: f64 = 30.0;
 /// The question at the end of a strict script, and the beginning of the answer without a fault.
-const AT_END: [&str; 2] = ["> faults", "~ none latched"];
+const AT_END: &str = "> faults\n~ none latched";
 /// Beginning of the line about a text that does not come.
 pub const SILENT: &str = "-> nothing said";
 /// Longest time in a script, s: an hour, as for `seconds`.
 const LONGEST_S: f64 = 3600.0;
 
+/// Longest wait for an answer, s: more than twice that for the slowest one.
+const ANSWER_S: f64 = 5.0;
+
 /// A request of a script.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Step {
-    /// Types a line, and waits for its answer.
-    Ask(String),
-    /// Types a line.
-    Type(String),
-    /// A command of the board itself.
-    Own(Own),
-    /// Lets time pass, s.
-    Pass(f64),
-    /// Waits until a line with this text has come, for at most this time, s.
-    Until(f64, String),
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Step {
+    /// The line that is typed.
+    pub typed: Option<String>,
+    /// The command of the board itself.
+    pub own: Option<Own>,
+    /// Whether the answer to the line ends the step.
+    pub asks: bool,
+    /// The text that ends the step. It must come.
+    pub until: Option<String>,
+    /// Longest duration of the step, s.
+    pub within: f64,
 }
 
 impl Step {
@@ -53,12 +56,15 @@ impl Step {
     /// # Errors
     /// It has none of the forms; the error states the reason.
     pub fn parse(request: &str) -> Result<Self, String> {
-        if let Some(line) = request.strip_prefix(">>") {
-            return Ok(Self::Type(line.trim().to_owned()));
-        }
         if let Some(line) = request.strip_prefix('>') {
-            let own = Own::parse(line)?.map(Self::Own);
-            return Ok(own.unwrap_or_else(|| Self::Ask(line.trim().to_owned())));
+            if let Some(own) = Own::parse(line)? {
+                return Ok(Self::own(own));
+            }
+            let typed = line.trim_start_matches('>').trim();
+            // An empty line has no answer.
+            let asks = !line.starts_with('>') && !typed.is_empty();
+            let within = if asks { ANSWER_S } else { 0.0 };
+            return Ok(Self { typed: Some(typed.to_owned()), asks, within, ..Self::default() });
         }
         let inner = request.strip_prefix('[').and_then(|inner| inner.strip_suffix(']'));
         let inner = inner.ok_or("write `> LINE` or `[...]`")?;
@@ -67,20 +73,23 @@ impl Step {
             seconds.ok_or_else(|| format!("`{time}`: not a time from 0 s to {LONGEST_S} s"))
         };
         let (word, text) = inner.split_once(": ").unwrap_or((inner, ""));
-        match word.strip_prefix("until") {
-            Some(_) if text.is_empty() => {
-                Err("write `[until: TEXT]` or `[until 2 s: TEXT]`".into())
-            }
-            Some("") => Ok(Self::Until(PATIENCE_S, text.to_owned())),
-            Some(time) => Ok(Self::Until(allowed(time.trim())?, text.to_owned())),
-            None if inner.starts_with(|c: char| c.is_ascii_digit()) => {
-                Ok(Self::Pass(allowed(inner)?))
-            }
-            None => {
-                let own = Own::parse(format!("!{word} {text}").trim())?;
-                own.map(Self::Own).ok_or_else(|| "no such command".to_owned())
-            }
+        if let Some(time) = word.strip_prefix("until") {
+            let time = time.trim();
+            let within = if time.is_empty() { PATIENCE_S } else { allowed(time)? };
+            let text = Some(text.to_owned()).filter(|text| !text.is_empty());
+            let until = text.ok_or("write `[until: TEXT]` or `[until 2 s: TEXT]`")?;
+            return Ok(Self { until: Some(until), within, ..Self::default() });
         }
+        if inner.starts_with(|c: char| c.is_ascii_digit()) {
+            return Ok(Self { within: allowed(inner)?, ..Self::default() });
+        }
+        let own = Own::parse(format!("!{word} {text}").trim())?;
+        own.map(Self::own).ok_or_else(|| "no such command".to_owned())
+    }
+
+    /// Lasts until the effect of the command is seen.
+    fn own(own: Own) -> Self {
+        Self { own: Some(own), within: 1e-3, ..Self::default() }
     }
 }
 
@@ -111,21 +120,18 @@ impl Script {
     /// # Errors
     /// The number of the first line with none of the forms, and the reason.
     pub fn parse(text: &str, strict: bool) -> Result<Self, String> {
-        let parsed =
-            exchanges(text)?.into_iter().map(|exchange| match Step::parse(&exchange.request) {
-                Ok(step) => Ok((step, exchange)),
-                Err(why) => Err(format!("line {}: `{}`: {why}", exchange.number, exchange.request)),
-            });
-        let mut lines = parsed.collect::<Result<Vec<_>, String>>()?;
-        let quit = lines.iter().position(|(step, _)| *step == Step::Own(Own::Quit));
-        lines.truncate(quit.unwrap_or(lines.len()));
-        if strict {
-            let (request, answer) = AT_END.map(str::to_owned).into();
-            let number = text.lines().count() + 1;
-            lines
-                .push((Step::parse(&request)?, Exchange { number, request, answer: vec![answer] }));
+        let (mut lines, mut quits) = (Vec::new(), false);
+        let faults = if strict { AT_END } else { "" };
+        for exchange in exchanges(&format!("{}\n{faults}", text.trim_end()))? {
+            let Exchange { number, request, .. } = &exchange;
+            let step = Step::parse(request);
+            let step = step.map_err(|why| format!("line {number}: `{request}`: {why}"))?;
+            quits |= step.own == Some(Own::Quit);
+            if !quits || faults.starts_with(request) {
+                lines.push((step, exchange));
+            }
         }
-        Ok(Self { lines, strict, quits: quit.is_some() })
+        Ok(Self { lines, strict, quits })
     }
 }
 

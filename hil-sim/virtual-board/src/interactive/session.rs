@@ -30,8 +30,6 @@ const LATE: Duration = Duration::from_millis(100);
 /// Time without a line after which a session without a person shows its time.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(10);
 
-/// Longest wait for the answer to a line of a script, s: more than twice that of the slowest answer.
-const ANSWER_S: f64 = 5.0;
 /// Time without a line after which an answer is complete, s: longer than any line takes on the wire.
 const SILENCE_S: f64 = 0.06;
 /// The reason why a session has ended, in words.
@@ -93,8 +91,6 @@ struct Seen {
     gates_on: bool,
     outputs: String,
     last: Option<Period>,
-    /// The drive's flux angle, the motor's, turns, and the motor's flux, Wb, in the last period.
-    flux: Option<[f64; 3]>,
     /// The text that a script waits for, and whether it has come.
     awaited: Option<String>,
     has_come: bool,
@@ -179,37 +175,21 @@ impl Session {
     /// The board cannot continue.
     pub fn play(&mut self, step: &Step) -> Result<Vec<String>> {
         let (from, began) = (self.lines.len(), self.board.time());
-        (self.seen.awaited, self.seen.has_come) = (None, false);
-        match step {
-            Step::Ask(line) | Step::Type(line) => self.type_line(line),
-            Step::Own(own) => self.carry_out(own)?,
-            Step::Until(_, text) => self.seen.awaited = Some(text.clone()),
-            Step::Pass(_) => {}
-        }
-        while self.seen.end.is_none() {
+        (self.seen.awaited, self.seen.has_come) = (step.until.clone(), false);
+        step.typed.iter().for_each(|line| self.type_line(line));
+        step.own.iter().try_for_each(|own| self.carry_out(own))?;
+        let answers = |line: &Line| line.source == Source::Said && !line.text.starts_with(UNASKED);
+        while self.seen.end.is_none() && !self.seen.has_come {
             let (now, since) = (self.board.time(), &self.lines[from..]);
-            let passed = now - began;
-            let is_over = match step {
-                Step::Type(_) => true,
-                Step::Own(_) => passed > 0.0,
-                Step::Pass(seconds) => passed >= *seconds,
-                Step::Until(within, _) => self.seen.has_come || passed > *within,
-                Step::Ask(line) => {
-                    let answers = |line: &Line| {
-                        line.source == Source::Said && !line.text.starts_with(UNASKED)
-                    };
-                    let last = since.last().map_or(began, |line| line.time);
-                    let is_answered = line.is_empty() || since.iter().any(answers);
-                    is_answered && now > last + SILENCE_S || passed > ANSWER_S
-                }
-            };
-            if is_over {
+            let is_silent = now > since.last().map_or(began, |line| line.time) + SILENCE_S;
+            let is_answered = step.asks && is_silent && since.iter().any(answers);
+            if is_answered || now - began >= step.within {
                 break;
             }
             self.turn()?;
         }
-        if let (Step::Until(within, text), false) = (step, self.seen.has_come) {
-            self.add(Source::Board, format!("nothing said `{text}` within {within} s"));
+        if let Some(text) = step.until.as_ref().filter(|_| !self.seen.has_come) {
+            self.add(Source::Board, format!("nothing said `{text}` within {} s", step.within));
         }
         let said = self.lines[from..].iter().filter_map(|line| match line.source {
             Source::Said => Some(line.text.clone()),
@@ -275,9 +255,13 @@ impl Session {
         }
         // The loader's answers are awaited.
         let slice = if self.board.loader.is_some() { SLICE / 10 } else { SLICE };
+        let interrupts = self.record.interrupts;
         let went = (0..slice).try_for_each(|_| self.period());
         self.hear()?;
-        if let Some([drive, motor, flux]) = self.seen.flux.take().filter(|_| self.inputs.flux) {
+        if self.inputs.flux && self.record.interrupts > interrupts {
+            let drive = f64::from(self.board.telemetry().phi.to_turns()).rem_euclid(1.0);
+            let plant = &self.board.plant;
+            let (motor, flux) = (plant.rotor_flux_angle() / TAU, plant.rotor_flux().norm());
             // A reader that has gone away does not stop the session.
             let _ = writeln!(std::io::stdout(), "flux {drive:.4} {motor:.4} {flux:.3}");
         }
@@ -344,10 +328,6 @@ impl Session {
         while let Some(period) = self.board.next_period() {
             let drive = self.board.telemetry();
             let time = period.began as f64 / TICKS_PER_S as f64;
-            let truth =
-                [self.board.plant.rotor_flux_angle() / TAU, self.board.plant.rotor_flux().norm()];
-            self.seen.flux =
-                Some([f64::from(drive.phi.to_turns()).rem_euclid(1.0), truth[0], truth[1]]);
             self.record.take(time, &self.board.plant, &period, &drive);
             self.seen.last = Some(period);
         }
@@ -360,12 +340,11 @@ impl Session {
             self.add(Source::Log, text);
         }
         for n in self.seen.resets..self.board.resets.len() {
-            self.seen.resets = n + 1;
-            let cause = self.board.resets[n].1;
-            self.add(Source::Board, cause.to_string());
+            self.add(Source::Board, self.board.resets[n].1.to_string());
             // A frame that the reset cut short must not swallow text.
             self.seen.wire = Splitter::default();
         }
+        self.seen.resets = self.board.resets.len();
         let active = ["RUN", "FAULT", "BRAKE"].into_iter().zip(self.board.terminal_outputs());
         let outputs: String =
             active.filter(|(_, on)| *on).map(|(name, _)| format!(" {name}")).collect();
