@@ -4,7 +4,7 @@
 use std::cell::{RefCell, RefMut};
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -30,7 +30,7 @@ use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
 use virtual_board::{Board, Counting, Image, Options, dump};
 
-use crate::common::program::{command, folder};
+use crate::common::program::{Running, command, folder};
 
 /// Number of control periods per second.
 const SECOND: f64 = 6000.0;
@@ -648,14 +648,8 @@ fn every_defect_of_the_first_turn_is_stopped_at_its_step() -> Result<()> {
     are_stopped(&defects, true)
 }
 
-/// A person who pulls the plug when asked to do something, or when the test has failed.
-struct Puller(Child);
-
-impl Drop for Puller {
-    fn drop(&mut self) {
-        let _ = self.0.kill().and_then(|()| self.0.wait());
-    }
-}
+/// A person who pulls the plug when asked to do something.
+struct Puller(Running);
 
 impl Person for Puller {
     fn tell(&mut self, text: &str) {
@@ -663,7 +657,7 @@ impl Person for Puller {
     }
 
     fn hand(&mut self, _: &str) -> Option<()> {
-        self.0.kill().and_then(|()| self.0.wait()).ok().map(drop)
+        self.0.end().ok()
     }
 
     fn see(&mut self, _: &str) -> Option<bool> {
@@ -681,7 +675,7 @@ fn a_serial_port_that_goes_is_noted() -> Result<()> {
     let folder = folder("first-light-port");
     let (table, file) = (Table::read()?, folder.join("evidence.toml"));
     let mut board = command(&folder, &["--fast"]);
-    let mut board = Puller(board.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?);
+    let mut board = Running(board.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?);
     let mut shown = BufReader::new(board.0.stdout.take().context("its output")?).lines();
     let first = shown.next().context("its port")??;
     let path = first.strip_prefix("console: ").context("a port")?;
@@ -696,7 +690,7 @@ fn a_serial_port_that_goes_is_noted() -> Result<()> {
     let evidence =
         Evidence { schema: SCHEMA, bench, board: REFERENCE.name.to_owned(), build, steps };
     evidence.write(&file)?;
-    let bench = (port, board);
+    let bench = (port, Puller(board));
     let why = Walk::new(&table, bench, options(&file), Arc::default())?.run().err();
     let why = why.context("it has ended")?.to_string();
     let evidence = Evidence::open(&file)?.context("a file")?;

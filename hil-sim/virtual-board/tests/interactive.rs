@@ -3,11 +3,11 @@
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
-use std::process::{Child, ChildStdout, Command, Output, Stdio};
+use std::process::{ChildStdout, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use crate::common::program::{command, folder};
+use crate::common::program::{Running, command, folder};
 use drive_stream::client::UNASKED;
 use hil_sim::Config;
 use hil_sim::console::catalogue::Catalogue;
@@ -36,16 +36,17 @@ fn lines(reader: impl std::io::Read + Send + 'static) -> Receiver<String> {
 
 /// A program that talks to a running board as to a serial port.
 struct Talk {
-    board: Child,
+    board: Running,
     shown: BufReader<ChildStdout>,
     port: File,
     said: Receiver<String>,
 }
 
 /// Starts a board; returns the process, its output, and its port.
-fn begin(mut command: Command) -> (Child, BufReader<ChildStdout>, File) {
-    let mut board = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
-    let mut shown = BufReader::new(board.stdout.take().unwrap());
+fn begin(mut command: Command) -> (Running, BufReader<ChildStdout>, File) {
+    let board = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+    let mut board = Running(board);
+    let mut shown = BufReader::new(board.0.stdout.take().unwrap());
     let mut first = String::new();
     shown.read_line(&mut first).unwrap();
     let path = first.trim().strip_prefix("console: ").expect(&first);
@@ -91,7 +92,7 @@ impl Talk {
     fn ended(mut self) -> String {
         let mut rest = String::new();
         std::io::Read::read_to_string(&mut self.shown, &mut rest).unwrap();
-        assert_eq!(self.board.wait().unwrap().code(), Some(0), "{rest}");
+        assert_eq!(self.board.0.wait().unwrap().code(), Some(0), "{rest}");
         rest
     }
 }
@@ -157,7 +158,7 @@ fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
     assert!(status.starts_with("regulating torque;") && status.contains("of 1.00 A"), "{status}");
     assert_eq!(talk.say("stop"), "ok");
     talk.until("off;");
-    talk.board.stdin.as_mut().unwrap().write_all(b"quit\n").unwrap();
+    talk.board.0.stdin.as_mut().unwrap().write_all(b"quit\n").unwrap();
     let shown = talk.ended();
     assert!(shown.contains("> torque 1\n") && shown.contains("# end: quit"), "{shown}");
     assert!(shown.contains("INFO"), "the log is shown: {shown}");
@@ -243,7 +244,7 @@ fn an_interrupt_still_writes_the_page() {
     let folder = folder("interrupt");
     let talk = Talk::new(command(&folder, &["--load", "speed", "-150", "--seconds", "60"]));
     talk.next();
-    let pid = talk.board.id().to_string();
+    let pid = talk.board.0.id().to_string();
     assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
     assert!(talk.ended().contains("# end: interrupted"));
     let report = Report::open(&folder);
@@ -298,8 +299,12 @@ fn what_is_wrong_is_named_before_anything_begins() {
 #[test]
 fn the_console_program_understands_the_image() {
     let folder = folder("console");
-    let (mut board, _shown, port) = begin(command(&folder, &[]));
-    let link = Link::new(port.try_clone().unwrap(), port, |_: &str| ());
+    let (_board, _shown, port) = begin(command(&folder, &[]));
+    let (say, unasked) = channel();
+    let show = move |line: &str| drop(say.send(line.to_owned()));
+    let link = Link::new(port.try_clone().unwrap(), port, show);
+    // What is typed before the firmware has set its port up is lost.
+    assert!(unasked.recv_timeout(ANSWER).unwrap().contains("last run"));
     let mut session = Session::new(link);
     let catalogue = Catalogue::read(&mut session.link).unwrap();
     assert!(catalogue.settings() > 50);
@@ -318,6 +323,4 @@ fn the_console_program_understands_the_image() {
     assert_eq!(session.enter("trace 20 2 i_q_a dc_link_v", |_| ()).unwrap(), Flow::Next);
     session.enter(&format!("!plot {}", plot.display()), |line| said.push(line.to_owned())).unwrap();
     assert!(said[1].starts_with("20 records in") && plot.exists(), "{said:?}");
-    board.kill().unwrap();
-    board.wait().unwrap();
 }

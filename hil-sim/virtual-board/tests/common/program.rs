@@ -1,7 +1,8 @@
 //! The program of `cargo sim board`, and a folder for its output.
 
+use std::io;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command};
 
 use virtual_board::board::simulated;
 
@@ -11,6 +12,23 @@ pub fn command(out: &Path, arguments: &[&str]) -> Command {
     command.env(simulated::TEST, simulated::test());
     command.arg("--out").arg(out).args(arguments);
     command
+}
+
+/// The process of a board, which does not outlast a test that fails.
+pub struct Running(pub Child);
+
+impl Running {
+    /// Ends the process, if it still runs.
+    pub fn end(&mut self) -> io::Result<()> {
+        self.0.kill()?;
+        self.0.wait().map(drop)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.end();
+    }
 }
 
 /// Returns a folder for a test.
