@@ -88,7 +88,7 @@ impl Pair {
         self.board.take_console();
         let mut client = Client::default();
         self.board.send(client.ask(line).as_bytes());
-        self.shadow.type_line(line)?;
+        self.shadow.type_line(line);
         let mut answer = None;
         self.until(&format!("an answer to {line:?}"), LONGEST_ANSWER, |pair, _| {
             let said = pair.board.take_console();

@@ -42,6 +42,8 @@ struct Orders {
     timer: Timer,
     learned: Option<Learned>,
     session: Session,
+    /// The settings with which the board starts after a reset.
+    saved: FirmwareSettings,
 }
 
 impl DriveHandle for Orders {
@@ -62,7 +64,8 @@ impl DriveHandle for Orders {
     fn session(&mut self) -> &mut Session {
         &mut self.session
     }
-    fn save(&mut self, _: &FirmwareSettings) -> Result<(), FlashError> {
+    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
+        self.saved = *settings;
         Ok(())
     }
     fn reboot(&mut self, _: bool) {}
@@ -87,13 +90,14 @@ impl Shadow {
         let timer = Timer::of(&settings.drive.inverter);
         let session = Session::new(&settings.drive);
         let (waiting, state, periods) = (VecDeque::new(), State::Off, compared as u32);
+        let saved = settings;
         Ok(Self {
             drive: Drive::new(settings.build_for(&timer)?),
             front_end: FrontEndState::default(),
             output: Output::default(),
             tracking: Tracking::new(&settings.drive),
             desk: Desk::new(settings),
-            orders: Orders { waiting, state, periods, timer, learned: None, session },
+            orders: Orders { waiting, state, periods, timer, learned: None, session, saved },
             tau_r: None,
             compared,
         })
@@ -108,11 +112,9 @@ impl Shadow {
         settings
     }
 
-    /// Processes a line that was typed at the console of the board. A refused request gives the drive no command, on the board and here.
-    ///
-    /// # Errors
-    /// The line is invalid.
-    pub fn type_line(&mut self, line: &str) -> Result<()> {
+    /// Processes a line that was typed at the console of the board. An invalid line and a refused request give the drive no command, on
+    /// the board and here.
+    pub fn type_line(&mut self, line: &str) {
         match grammar::parse(line) {
             Ok(Request::Order(order)) => {
                 let _ = self.desk.order(Commander::Console, order, &mut self.orders);
@@ -122,18 +124,16 @@ impl Shadow {
             Ok(Request::Set(values)) => {
                 drop(self.desk.set(Commander::Console, &values, &self.orders))
             }
-            Ok(_) => {} // no order
-            Err(why) => bail!("{line}: {why}"),
+            Ok(_) | Err(_) => {}
         }
-        Ok(())
     }
 
-    /// Restarts after a reset of the board, with these settings, which were saved.
+    /// Restarts after a reset of the board, with the settings that were saved last.
     ///
     /// # Errors
     /// No drive can be made from them.
-    pub fn restart(&mut self, settings: FirmwareSettings) -> Result<()> {
-        *self = Self::with(settings, self.compared)?;
+    pub fn restart(&mut self) -> Result<()> {
+        *self = Self::with(self.orders.saved, self.compared)?;
         Ok(())
     }
 

@@ -11,9 +11,8 @@ const LEARNING: u64 = 3_600_000;
 
 /// Interrupts the power.
 fn power_cycle(pair: &mut Pair) -> Result<()> {
-    let settings = *pair.shadow.firmware_settings();
     pair.board.reset(Reset::Power);
-    pair.shadow.restart(settings)?;
+    pair.shadow.restart()?;
     pair.greeted()
 }
 

@@ -19,7 +19,7 @@ const PERIOD: u32 = 2 * PWM_TOP as u32;
 fn cost(pair: &mut Pair, line: &str) -> Result<(u32, u32)> {
     let (mut taken, mut all) = (None, Vec::new());
     pair.board.type_line(line);
-    pair.shadow.type_line(line)?;
+    pair.shadow.type_line(line);
     while taken.is_none() && all.len() < LONGEST {
         pair.run(1, |_, period| {
             all.push(period.cycles);

@@ -23,7 +23,7 @@ use virtual_board::interactive::session::{Inputs, Session};
 use virtual_board::interactive::transcript::Source;
 use virtual_board::power_stage::{DcLinkPin, PowerStage};
 use virtual_board::rules::Rule;
-use virtual_board::{Board, Image, Options};
+use virtual_board::{Board, Image, Options, Shadow};
 
 #[path = "../../../tests/sessions/played.rs"]
 mod played;
@@ -105,7 +105,11 @@ impl Player {
         }
         let session = self.session.as_mut().context("no board")?;
         match (name, &self.kept) {
-            ("keep", _) => self.kept = Some(session.board.keep()?),
+            ("alone", _) => session.shadow = None,
+            ("keep", _) => {
+                self.kept = Some(session.board.keep()?);
+                session.shadow = None;
+            }
             ("go back", Some(kept)) => {
                 session.board.go_back(kept)?;
                 self.before = session.lines.len();
@@ -256,9 +260,12 @@ fn power_up(value: &str) -> Result<Session> {
         flux: false,
         show: |_| (),
     };
+    let shadow = Shadow::new(&options)?;
     let mut board = Board::new(Image::built_for(image)?, options)?;
     if may_be_busy {
         board.collect_violations();
     }
-    Ok(Session::new(board, Pty::open()?, Pty::open()?, inputs))
+    let mut session = Session::new(board, Pty::open()?, Pty::open()?, inputs);
+    session.shadow = Some(shadow);
+    Ok(session)
 }

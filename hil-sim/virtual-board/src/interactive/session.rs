@@ -18,6 +18,7 @@ use super::{flash_file::FlashFile, own::Own, pty::Pty, record::Record};
 use crate::board::{Board, Period};
 use crate::chip::{TICKS_PER_PERIOD as PERIOD, TICKS_PER_S};
 use crate::periph::Reset;
+use crate::shadow::Shadow;
 
 /// Number of control periods between two exchanges with the inputs: 5 ms, which a person does not notice.
 const SLICE: u32 = 30;
@@ -62,6 +63,8 @@ pub struct Inputs {
 pub struct Session {
     /// The board.
     pub board: Board,
+    /// The drive on the host, as long as its compare values must be those of the board.
+    pub shadow: Option<Shadow>,
     pty: Pty,
     bus: Pty,
     inputs: Inputs,
@@ -104,6 +107,7 @@ impl Session {
             dc_link_v: board.plant.dc_link(),
             clock: (Instant::now(), board.time()),
             board,
+            shadow: None,
             pty,
             bus,
             inputs,
@@ -272,6 +276,7 @@ impl Session {
     fn type_line(&mut self, line: &str) {
         self.send(line.as_bytes());
         self.send(b"\n");
+        self.shadow.iter_mut().for_each(|shadow| shadow.type_line(line));
     }
 
     /// Executes a command of the board.
@@ -329,6 +334,7 @@ impl Session {
             let drive = self.board.telemetry();
             let time = period.began as f64 / TICKS_PER_S as f64;
             self.record.take(time, &self.board.plant, &period, &drive);
+            self.shadow.iter_mut().try_for_each(|shadow| shadow.follow(&period))?;
             self.seen.last = Some(period);
         }
         Ok(())
@@ -341,6 +347,7 @@ impl Session {
         }
         for n in self.seen.resets..self.board.resets.len() {
             self.add(Source::Board, self.board.resets[n].1.to_string());
+            self.shadow.iter_mut().try_for_each(Shadow::restart)?;
             // A frame that the reset cut short must not swallow text.
             self.seen.wire = Splitter::default();
         }
