@@ -2,32 +2,24 @@
 
 use crate::common;
 use anyhow::{Context, Result};
-use drive_core::{Fault, State};
+use drive_core::State;
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
 use virtual_board::board::Debugger;
 use virtual_board::periph::Reset;
-use virtual_board::shadow::Shadow;
-use virtual_board::{Board, Image, Options, Pair};
+use virtual_board::{Board, Pair};
 
 /// The brake resistor, ohm.
 const OHM: f64 = 100.0;
 /// Voltage above which the drive trips, V.
 const TRIP_V: f64 = 400.0;
 
-/// The first double word of the history.
-const HISTORY: u32 = 0x0807_c000;
-
 /// Returns a drive with encoder and brake resistor, and this dc link.
 fn braked(change: impl Fn(&mut Config), more: &[&str]) -> Result<Pair> {
     let mut config = Config::default();
     config.dc_link.chopper = OHM;
     change(&mut config);
-    ordered(common::pair(&config, 41)?, more)
-}
-
-/// Sets such a drive up on a board that waits for requests.
-fn ordered(mut pair: Pair, more: &[&str]) -> Result<Pair> {
+    let mut pair = common::pair(&config, 41)?;
     pair.order("angle encoder")?;
     pair.order(&format!("set braking.ohm {OHM}"))?;
     for line in more {
@@ -139,66 +131,6 @@ fn every_end_takes_the_chopper_off() -> Result<()> {
     pair.board.run_periods(130)?;
     assert_eq!(pair.board.resets.last().map(|r| r.1), Some(Reset::Software));
     assert_eq!(pair.board.chip().chopper_duty(), 0.0);
-    Ok(())
-}
-
-/// Brakes at a stiff link of 385 V; returns the share of time for which the chopper conducts.
-fn brakes(pair: &mut Pair) -> Result<f64> {
-    pair.start_torque()?;
-    pair.board.plant.set_dc_link(385.0)?;
-    pair.run(600, |_, _| {})?;
-    Ok(pair.board.chip().chopper_duty())
-}
-
-/// A break inside the chip switches the chopper off; it comes back after the cause is gone and the drive is off.
-#[test]
-fn the_chopper_survives_a_dip_of_the_supply() -> Result<()> {
-    let dip = |pair: &mut Pair| {
-        pair.board.chip().set_supply(2.7);
-        pair.board.run_ticks(10 * 170)?;
-        assert_eq!(pair.board.chip().chopper_duty(), 0.0);
-        pair.board.chip().set_supply(3.3);
-        pair.run(60, |_, _| {})
-    };
-    let mut pair = braked(|_| {}, &[])?;
-    dip(&mut pair)?;
-    let duty = brakes(&mut pair)?;
-    assert!((0.5..0.8).contains(&duty), "{duty} after a dip with the outputs off");
-    dip(&mut pair)?;
-    assert_eq!(pair.shadow.drive.state(), State::Fault(Fault::Break));
-    pair.board.plant.set_dc_link(311.0)?;
-    pair.order("clear")?;
-    let duty = brakes(&mut pair)?;
-    assert!((0.5..0.8).contains(&duty), "{duty} after a dip with the outputs on");
-    // Only the chopper is off, while the drive relies on it.
-    pair.board.chip().tim8.system_break();
-    pair.run(2, |_, _| {})?;
-    assert_eq!(pair.shadow.drive.state(), State::Fault(Fault::ChopperOff));
-    assert!(!pair.board.chip().tim1.outputs_on());
-    pair.board.plant.set_dc_link(311.0)?;
-    pair.order("clear")?;
-    let duty = brakes(&mut pair)?;
-    assert!((0.5..0.8).contains(&duty), "{duty} after fault 49");
-    assert!(pair.board.resets.is_empty(), "{:?}", pair.board.resets);
-    Ok(())
-}
-
-/// A power failure has torn a word of the history: reading it at the next start is an error of the flash, which is tolerated.
-#[test]
-fn the_chopper_survives_a_torn_word_of_the_history() -> Result<()> {
-    let mut config = Config::default();
-    config.dc_link.chopper = OHM;
-    let options = Options::new(&config, 42);
-    let shadow = Shadow::new(&options)?;
-    let mut board = Board::new(Image::built()?, options)?;
-    board.chip().flash.tear(HISTORY);
-    let mut pair = Pair { shadow, board };
-    pair.greeted()?;
-    assert!(!pair.board.take_log()?.iter().any(|line| line.contains("break input")));
-    let mut pair = ordered(pair, &[])?;
-    let duty = brakes(&mut pair)?;
-    assert!((0.5..0.8).contains(&duty), "{duty}");
-    assert!(pair.board.resets.is_empty(), "{:?}", pair.board.resets);
     Ok(())
 }
 

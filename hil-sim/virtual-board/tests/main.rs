@@ -18,7 +18,6 @@ mod flips;
 mod foreign;
 mod hardware;
 mod interactive;
-mod learned;
 mod modbus;
 mod motors;
 mod orders;

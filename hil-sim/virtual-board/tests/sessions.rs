@@ -21,12 +21,16 @@ use virtual_board::interactive::pty::Pty;
 use virtual_board::interactive::script::{SILENT, Step};
 use virtual_board::interactive::session::{Inputs, Session};
 use virtual_board::interactive::transcript::Source;
+use virtual_board::periph::flash::DBANK;
 use virtual_board::power_stage::{DcLinkPin, PowerStage};
 use virtual_board::rules::Rule;
 use virtual_board::{Board, Image, Options, Shadow};
 
 #[path = "../../../tests/sessions/played.rs"]
 mod played;
+
+/// The first double word of the history.
+const HISTORY: u32 = 0x0807_c000;
 
 /// Makes one test of each session, whose file has the name of the test with hyphens.
 macro_rules! sessions {
@@ -44,6 +48,7 @@ macro_rules! sessions {
 sessions! {
     board_confirmation
     board_settings
+    chopper
     chopper_lost
     commissioning
     commissioning_of_the_current_loop
@@ -52,13 +57,17 @@ sessions! {
     history
     homing
     image_of_another_board
+    learned
     self_test_damage
     self_test_dc_link
     self_test_pins
+    slow_flash
     sources
     sources_while_running
     start
+    start_refused
     terminal_strip
+    volts_per_hertz
 }
 
 fn folder() -> PathBuf {
@@ -180,6 +189,14 @@ fn at_the_bench(board: &mut Board, name: &str, value: &str) -> Result<Option<Opt
         ("clocks", [crystal, oscillator]) => board.chip().set_clocks(*crystal, *oscillator),
         ("reference voltage", [error]) => board.chip().set_reference(*error),
         ("crystal", _) => board.set_crystal(value != "stopped"),
+        ("pll", _) => board.chip().rcc.pll_locks = value != "unlocked",
+        ("flash cycles", [cycles]) => board.chip().flash_cycles = *cycles as u64,
+        ("single flash bank", _) => board.chip().flash.options &= !DBANK,
+        ("supply", [volts, ..]) => board.chip().set_supply(*volts),
+        ("torn history", _) => board.chip().flash.tear(HISTORY),
+        ("chopper", _) => {
+            return Ok(Some(Some(format!("{:.3}", board.chip().chopper_duty()))));
+        }
         ("chopper off", _) => board.chip().tim8.system_break(),
         ("no samples", _) => board.chip().adc.lose_triggers = [u32::MAX; 2],
         ("boot pin not in use", _) => board.chip().flash.options &= !N_SWBOOT0,

@@ -9,7 +9,6 @@ use hil_sim::Config;
 use virtual_board::board::Debugger;
 use virtual_board::cpu::Register;
 use virtual_board::periph::Reset;
-use virtual_board::periph::flash::DBANK;
 use virtual_board::rules::{Rule, Violation};
 use virtual_board::{Board, Counting, Image, Options};
 
@@ -107,21 +106,6 @@ fn a_detached_probe_changes_nothing() -> Result<()> {
     Ok(())
 }
 
-/// Code from the flash takes three cycles an instruction, as with wait states and missed caches: the image starts, and
-/// the watchdog is fed. Prints the time of the start.
-#[test]
-fn it_starts_with_slow_flash() -> Result<()> {
-    for cycles in [1, 3] {
-        let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 13))?;
-        board.chip().flash_cycles = cycles;
-        common::until_said(&mut board, "last run: ")?;
-        println!("{cycles} cycles an instruction: greeting after {:.2} s", board.time());
-        board.run_periods(6000)?;
-        assert!(board.resets.is_empty(), "{:?}", board.resets);
-    }
-    Ok(())
-}
-
 /// Below the level of the supply monitor the outputs go off in hardware; a brown-out resets the chip.
 #[test]
 fn a_sagging_supply_switches_off() -> Result<()> {
@@ -148,36 +132,6 @@ fn a_stack_in_the_guard_faults() -> Result<()> {
     board.run_periods(60)?;
     assert_eq!(board.resets.last().map(|reset| reset.1), Some(Reset::Software));
     common::until_said(&mut board, "reset by software").map(drop)
-}
-
-/// The PLL does not lock: the chip stays on its internal oscillator, and reports why it does not start. (At the console
-/// only a terminal with 16/170 of the rate could read it.)
-#[test]
-fn a_pll_that_does_not_lock_is_refused() -> Result<()> {
-    for crystal in [true, false] {
-        let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 18))?;
-        board.chip().rcc.pll_locks = false;
-        board.set_crystal(crystal);
-        board.run_periods(START)?;
-        let log = board.take_log()?;
-        let told =
-            |line: &String| line.contains("not started") && line.contains("PLL does not lock");
-        assert!(log.iter().any(told), "{log:#?}");
-        assert!(!board.chip().tim1.outputs_on() && board.resets.is_empty());
-    }
-    Ok(())
-}
-
-/// A chip whose option bytes select a single flash bank does not start.
-#[test]
-fn a_single_bank_chip_is_refused() -> Result<()> {
-    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 16))?;
-    board.chip().flash.options &= !DBANK;
-    board.run_periods(START)?;
-    let heard = board.take_console();
-    assert!(heard.contains("not started") && heard.contains("bank"), "{heard}");
-    assert!(!board.chip().tim1.outputs_on());
-    Ok(())
 }
 
 /// The image of commit 1abee12, in which a review found faults F1 to F7, fails for each of them:
