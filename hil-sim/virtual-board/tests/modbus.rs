@@ -206,33 +206,6 @@ fn the_answer_comes_at_once_and_in_one_piece() -> Result<()> {
     Ok(())
 }
 
-/// The console stops the drive although the bus commands. A master that repeats its run command does not start the
-/// drive before it has written a stop. Without frames the drive stops after the time-out of commands.
-#[test]
-fn one_commands_anybody_stops_and_a_lost_bus_stops_the_drive() -> Result<()> {
-    let mut master = Master::new(&BUS)?;
-    for last in ["stop", "silence"] {
-        assert_eq!(master.write(COMMAND, 1)?, None);
-        assert_eq!(master.write(COMMAND, 18)?, None);
-        assert_eq!(master.write(0x2001, 300)?, None);
-        master.run(3.0)?;
-        assert!(master.outputs_on() && master.rpm() > 60.0, "{} rpm", master.rpm());
-        if last == "stop" {
-            master.board.type_line("stop");
-            master.run(1.0)?;
-        } else {
-            // The time-out of 1 s passes, then the torque goes to zero, at once without load.
-            master.board.run_periods(6000 * 3 / 4)?;
-            assert!(master.outputs_on());
-            master.board.run_periods(6000 * 3 / 4)?;
-        }
-        assert!(!master.outputs_on(), "{last}");
-        assert_eq!(master.write(COMMAND, 18)?, Some(SERVER_FAILURE), "{last}");
-        assert!(!master.outputs_on());
-    }
-    Ok(())
-}
-
 /// Rate, format and address are settings; frames with another parity are ignored.
 #[test]
 fn rate_format_and_address_follow_the_settings() -> Result<()> {
