@@ -303,7 +303,7 @@ fn the_console_program_understands_the_image() {
     let (say, unasked) = channel();
     let show = move |line: &str| drop(say.send(line.to_owned()));
     let link = Link::new(port.try_clone().unwrap(), port, show);
-    // What is typed before the firmware has set its port up is lost.
+    // A line that comes before the greeting is lost.
     assert!(unasked.recv_timeout(ANSWER).unwrap().contains("last run"));
     let mut session = Session::new(link);
     let catalogue = Catalogue::read(&mut session.link).unwrap();
