@@ -134,6 +134,8 @@ pub fn of_console(text: &str) -> Result<Passport, String> {
             let used = line.split("; ").filter(|part| !part.ends_with("not used)"));
             (learned, table) =
                 (used.filter_map(|part| quantity("learned", part)).collect(), Vec::new());
+        } else if line.starts_with("torque ripple") {
+            learned.extend(quantity("learned", line));
         } else if let [Some(_), Some(_), _, _] = cells[..] {
             table.push([cells[0], cells[1], cells[2], cells[3]]);
         } else if line.contains(", image ") {

@@ -125,15 +125,15 @@ pub fn fault(fault: Fault, i: usize) -> Option<impl fmt::Display> {
     }))
 }
 
-/// Line number `i` of the result of a self-commissioning; `None` after the last line. The fitted values come first, then a table of
-/// saliency offset, saliency sensitivity and injection current over the q-axis current.
+/// Line number `i` of the result of a self-commissioning; `None` after the last line. The fitted values come first, then the torque
+/// ripple, then a table of saliency offset, saliency sensitivity and injection current over the q-axis current.
 pub fn learned(
     result: &Learned,
     believable: bool,
     drive: &Settings,
     i: u16,
 ) -> Option<impl fmt::Display> {
-    let lines = 2 + result.reference.points().len().min(result.points + 1);
+    let lines = 3 + result.reference.points().len().min(result.points + 1);
     let line = usize::from(i);
     (line < lines).then_some(fmt::from_fn(move |f| match line {
         0 => {
@@ -147,11 +147,11 @@ pub fn learned(
             )?;
             fitted(f, "gain mismatch", &result.gain_mismatch)?;
             fitted(f, "current saliency", &result.current_saliency)?;
-            write!(f, "flux saliency {:.5}; ", result.flux_saliency)?;
-            write!(f, "{}", ripple(drive, result))
+            write!(f, "flux saliency {:.5}", result.flux_saliency)
         }
-        1 => f.write_str("i_q,reference,slope,carrier"),
-        _ => point(f, result, line - 2),
+        1 => write!(f, "{}", ripple(drive, result)),
+        2 => f.write_str("i_q,reference,slope,carrier"),
+        _ => point(f, result, line - 3),
     }))
 }
 
