@@ -5,13 +5,16 @@ import os
 import pathlib
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import induction_drive as drive
 import nbformat
 import numpy as np
+import pandas
 import pytest
 from nbclient import NotebookClient
 
+MOTORS = ["dissertation", "krause-3hp", "motulator-2kw2"]
 NOTEBOOKS = sorted((pathlib.Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))
 
 # A point a sample.
@@ -159,12 +162,55 @@ def test_a_commissioning_finds_the_motor():
 
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
-def test_the_notebook_runs(file):
+def test_the_notebook_runs(file, tmp_path):
     notebook = nbformat.read(file, as_version=4)
-    NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
+    NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     text = "".join(output.get("text", "") for output in outputs)
     pictures = [output for output in outputs if "image/png" in output.get("data", {})]
     print(text)
+    if file.stem == "my_motor":
+        assert len(pictures) == 1 and "mean torque" in text
+        return
     beside_motulator = sys.version_info >= (3, 12)
     assert len(pictures) == 3 + beside_motulator and ("times motulator's speed" in text) == beside_motulator
+
+
+def test_editors_know_every_name(tmp_path):
+    """The stubs describe the module as it is."""
+    # The library inside of the package has no stubs of its own.
+    allowed = tmp_path / "allowed"
+    allowed.write_text("induction_drive.induction_drive\n")
+    stubs = [sys.executable, "-m", "mypy.stubtest", "induction_drive", "--ignore-disjoint-bases", "--allowlist", allowed]
+    checked = subprocess.run(stubs, capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
+def test_the_readme_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (pathlib.Path(__file__).parent.parent / "README.md").read_text()
+    examples = [part.split("```")[0] for part in text.split("```python\n")[1:]]
+    assert len(examples) == 2
+    for example in examples:
+        exec(example, {})
+
+
+def test_a_run_is_a_table_with_units():
+    """The recipe of docs/python.md."""
+    rig = drive.Rig(drive.Config())
+    rig.start("torque")
+    rig.command("torque", 2.0)
+    table = pandas.DataFrame(rig.run(0.5)).set_index("time_s")
+    units = {name: name.rsplit("_", 1)[1] for name in table if "_" in name}
+    assert units["torque_nm"] == "nm" and units["current_a"] == "a"
+    assert table["torque_nm"].tail(2400).mean() == pytest.approx(0.64, abs=0.01)
+
+
+def test_motors_run_on_all_cores():
+    """The recipe of docs/python.md: a run does not hold the interpreter."""
+    def torque(motor):
+        return drive.run("torque-steps", drive.Config(motor=motor))["metrics"]["angle_error_max_deg"]
+
+    with ThreadPoolExecutor() as cores:
+        errors = dict(zip(MOTORS, cores.map(torque, MOTORS)))
+    assert all(error < 8 for error in errors.values()), errors

@@ -9,20 +9,20 @@ use glob::glob;
 
 use crate::{paths, run};
 
-/// The wheels of this version, sorted by system.
+/// The wheels of this version, sorted by system, and behind them the source distribution.
 pub fn wheels() -> Result<Vec<PathBuf>> {
-    let names = concat!("wheels/*-", env!("CARGO_PKG_VERSION"), "-*.whl");
+    let names = concat!("wheels/*-", env!("CARGO_PKG_VERSION"), "[-.]*");
     let found = glob(&run::target_dir()?.join(names).to_string_lossy())?;
     found.collect::<Result<_, _>>().context("wheels")
 }
 
-/// Builds the wheel of this version into `target/wheels`, and the program that it is compared with, and runs the tests.
+/// Builds the wheel of this version and its sources into `target/wheels`, and the program that it is compared with, and runs the tests.
 pub fn test() -> Result<()> {
     let host = run::output("rustc", &["--print", "host-tuple"])?;
     let options = ["--locked", "--profile", run::SHIPPED, &paths::option(&host)?];
     run::step("program", run::plain(&mut run::cargo("build --package hil-sim")).args(options))?;
     wheels()?.iter().try_for_each(fs::remove_file)?;
-    let mut build = environment("build", &["maturin==1.16.0"])?;
+    let mut build = environment("build", &["maturin==1.16.0", "twine==7.0.0"])?;
     build.args(["-m", "maturin", "build", "--manifest-path", "python/Cargo.toml", "--out"]);
     build.arg(run::folder("wheels")?).args(options);
     run::step("wheel", run::plain(&mut build))?;
@@ -30,6 +30,11 @@ pub fn test() -> Result<()> {
     paths::check(&fs::read(built.join("libinduction_drive_python.so")).unwrap_or_default())?;
     let wheel = wheels()?.pop().context("maturin has made no wheel of this version")?;
     println!("{}: {} bytes", wheel.display(), fs::metadata(&wheel)?.len());
+    let mut sources = run::command(build.get_program());
+    sources.args(["-m", "maturin", "sdist", "--manifest-path", "python/Cargo.toml", "--out"]);
+    run::step("source distribution", sources.arg(run::folder("wheels")?))?;
+    let mut check = run::command(build.get_program());
+    run::step("texts for PyPI", check.args(["-m", "twine", "check", "--strict"]).args(wheels()?))?;
 
     let needed = [&*wheel.to_string_lossy(), "-r", "python/tests/requirements.txt"];
     let mut test = environment("clean", &needed)?;
