@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};
 
+use hil_sim::Config;
 use hil_sim::config::motors::Motor;
 use hil_sim::experiments::{EXPERIMENTS, Experiment, WITH_INPUT};
 use serde::{Deserialize, Serialize};
