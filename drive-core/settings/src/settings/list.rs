@@ -272,7 +272,8 @@ settings! {
             .beside(|s| (if s.watches_lock() { 0.003 * s.inverter.dc_link_v } else { 0.0 }, 0.55 * s.inverter.dc_link_v)).learned();
         /// largest torque ripple of the injection on the q axis, of the rated torque
         ///
-        /// It is the amplitude at 600 Hz and bounds `injection.amplitude_v` unless that is set. With half of the ripple the angle error of
+        /// It is the amplitude at 600 Hz and bounds `injection.amplitude_v` unless that is set, down to 35 V at 311 V, which the dead time
+        /// requires of motors with little leakage. With half of the ripple the angle error of
         /// a simulated motor grows from 0.9° to 1.6° rms and from 5° to 20° at most (`krause-3hp`, plant R); with 0.9 of it, by 0.1° rms.
         torque_pct: f32 = 20.0, 134: number("%").from_to(1.0, 200.0);
         /// axis of the injection in the frame of the flux

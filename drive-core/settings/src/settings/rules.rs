@@ -276,6 +276,7 @@ impl Settings {
             f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0));
         let nm = WITHIN / 100.0 * self.injection.torque_pct * self.nameplate.torque_nm();
         let shaking = nm / self.motor.torque_per_ampere(self.i_d()) * reactance;
+        let shaking = shaking.max(self.share_of_dc_link(35.0));
         if self.injection.axis == InjectionAxis::Q { sensed.min(shaking) } else { sensed }
     }
 
