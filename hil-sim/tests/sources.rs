@@ -113,7 +113,7 @@ fn the_list_is_what_the_sources_print() {
     #[rustfmt::skip] // as many values as a line holds
     let typed = [
         ("S1", "Table 6, 0.5 A", "k_phi", "1.6145"), ("S0", "Tables 1 to 3", "speed", "375"), ("S1", "Table 6, 0.5 A", "Re p", "0.98668"),
-        ("S0", "section 5", "M, measurements", "7"), ("S1", "Figure 22, level 3", "reference of the quadrature current", "-2"),
+        ("S0", "section 5", "M, measurements", "7"), ("S1", "Figure 22, level 3", "reference of i_q", "-2"),
         ("S0", "Table 4, f_0a", "Sg 200 us", "0.5968"), ("S1", "section 3.7", "fictitious frequency of the pole from the parameters", "1073"),
         ("S0", "Table 1, f_1b", "Sg 200 us", "4.7585"), ("S1", "section 3.10", "frequency of the pole of Eq. 3.42", "300.88"),
         ("S0", "Table 3, B, sigma_l_s", "Ss 200 us", "3.4407"), ("S1", "Table 7, i = 2", "b (LPF)", "15.501482170609810"),

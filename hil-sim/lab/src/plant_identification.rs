@@ -92,14 +92,14 @@ const TRIALS: [Trial; 3] = [
 
 /// Pseudo-random voltage on q, at a q-axis current of 2 A.
 fn at_2_a(rig: &mut Rig) -> Result<Record, Error> {
-    let level = printed("Figure 32", "reference of the quadrature current");
+    let level = printed("Figure 32", "reference of i_q");
     rig.settle(&Command::Torque(level as f32), 1.0)?;
     prbs(rig, Axis::Q)
 }
 
 fn steps(rig: &mut Rig) -> Result<Record, Error> {
     let mut record = Record::default();
-    for level in source::column("S1", "Figure 22", "reference of the quadrature current") {
+    for level in source::column("S1", "Figure 22", "reference of i_q") {
         rig.command(&Command::Torque(level as f32))?;
         for _ in 0..(LEVEL_S * RATE_HZ) as usize {
             record.push(rig, Axis::Q);
