@@ -1,5 +1,5 @@
-//! Gives the program a number of its sources: shards of a run that were made by different sources do not belong
-//! together, though the version is the same.
+//! Gives the program a number of its sources: a run that was begun by other sources is not continued, though the
+//! version is the same.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};

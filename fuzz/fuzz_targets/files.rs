@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use hil_sim::config::{Config, Key};
 use hil_sim::console::update::Image;
 use hil_sim::experiments::scenario::Scenario;
-use hil_sim::shards::{Header, Journal, Shard};
+use hil_sim::journal::{Header, Journal};
 use hil_sim::{error, passport};
 use induction_drive_fuzz::sum;
 use libfuzzer_sys::fuzz_target;
@@ -16,7 +16,7 @@ use libfuzzer_sys::fuzz_target;
 const OTHERS: &str = "time_s torque_current_a speed_rpm position_turns load_nm load_rpm torque_current load [[part]] [settings] \
     [[metrics]] [[judge]] [[panel]] [[source]] seconds start stop coast ramp quick figure title source columns samples remarks of \
     statistic over within lines label dashed keys from unverified after. drive. true false 1e300 1e9 nan inf -0 null schema image \
-    measured over_torque_current twin step name value deviation unit experiment seed shard index count runs run record version \
+    measured over_torque_current twin step name value deviation unit experiment seed index count runs run record version \
     sources schema_version settings commissioning: learned: nameplate refused spread effective";
 
 /// The text of an input: a byte from 0xe0 and the next one stand for a word, which the fuzzer does not find letter by letter.
@@ -68,7 +68,7 @@ fn resume(path: &Path, known: bool, config: &Config) -> Result<(), hil_sim::Erro
         let head = serde_json::to_vec(&header).expect("JSON");
         std::fs::write(path, [&head, b"\n".as_slice(), &text].concat()).expect("written");
     }
-    Journal::open(path, Shard::WHOLE, &header).map(drop)
+    Journal::open(path, &header).map(drop)
 }
 
 fuzz_target!(|bytes: &[u8]| {
@@ -94,7 +94,7 @@ fuzz_target!(|bytes: &[u8]| {
         2 => load(None, Some(&file("config.toml"))),
         3 => load(Some(&file("motor.toml")), None),
         4 => load(Some(&file("passport.json")), None),
-        5 => resume(&file("shard"), *kind >= 128, &config),
+        5 => resume(&file("runs"), *kind >= 128, &config),
         6 => passport::of_console(&text).map(drop).map_err(hil_sim::Error::Refused),
         _ => Image::new(image(bytes)).map(drop).map_err(hil_sim::Error::refused),
     };

@@ -2,7 +2,7 @@
 #![deny(clippy::use_debug)]
 
 mod lists;
-mod part;
+mod records;
 mod report;
 mod run;
 mod used;

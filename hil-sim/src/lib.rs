@@ -9,12 +9,12 @@ pub mod console;
 pub mod experiments;
 pub mod first_light;
 pub mod input;
+pub mod journal;
 pub mod passport;
 mod prelude;
 mod random;
 pub mod report;
 pub mod sessions;
-pub mod shards;
 
 pub use sim_bench::{
     Config, Error, Outcome, bounded, columns, config, error, outcome, plant, progress, rig, stats,

@@ -15,9 +15,8 @@ fn arguments(line: &str) -> Vec<&str> {
 #[test]
 fn each_message_names_the_thing_the_value_and_what_is_allowed() {
     let folder = folder("wrong-input");
-    std::fs::create_dir(folder.join("runs")).unwrap();
     // A device file has no end.
-    for name in ["zero.toml", "zero.json", "runs/zero.jsonl"] {
+    for name in ["zero.toml", "zero.json", "zero.jsonl"] {
         std::os::unix::fs::symlink("/dev/zero", folder.join(name)).unwrap();
     }
     let lines = include_str!("wrong_input.txt").lines();

@@ -8,7 +8,7 @@ use std::path::Path;
 pub const TEXT_MIB: u64 = 16;
 /// Largest table of numbers, MiB: three minutes of seven columns at 6000 rows a second.
 pub const TABLE_MIB: u64 = 64;
-/// Largest shard or file of `--resume`, MiB.
+/// Largest file of `--resume`, MiB.
 pub const RUNS_MIB: u64 = 256;
 
 /// Reads to the end, or fails after this many MiB.

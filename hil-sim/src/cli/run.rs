@@ -2,7 +2,7 @@
 
 use trace::Voltages;
 
-use super::part::Part;
+use super::records::Records;
 use super::{say, used};
 use crate::config::motors::Motor;
 use crate::experiments::source::evidence::Evidence;
@@ -26,7 +26,7 @@ pub struct Output {
     pub csv: Option<PathBuf>,
 }
 
-/// A requested run: its experiment, input, part and output.
+/// A requested run: its experiment, input, files of single runs, and output.
 #[derive(Args, Default)]
 pub struct Request {
     /// Name of the experiment as in `list`, or the TOML file of a scenario
@@ -37,7 +37,7 @@ pub struct Request {
     #[command(flatten)]
     pub input: Input,
     #[command(flatten)]
-    pub part: Part,
+    pub records: Records,
     #[command(flatten)]
     pub output: Output,
 }
@@ -162,9 +162,9 @@ pub fn json(name: String, file: Option<PathBuf>, input: Input) -> Result<String,
 /// Returns the JSON objects of the results, if requested, and whether one of the runs failed.
 ///
 /// # Errors
-/// As [`experiments::find`], [`Input::config`], [`used::check`] and [`Part::run`]; the errors of the experiment; [`Error::Write`].
+/// As [`experiments::find`], [`Input::config`], [`used::check`] and [`Records::run`]; the errors of the experiment; [`Error::Write`].
 fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
-    let Request { name, input, part, output, .. } = request;
+    let Request { name, input, records, output, .. } = request;
     let own = scenario::own(name);
     let chosen: Vec<_> = match &own {
         Some(own) => vec![own],
@@ -181,7 +181,7 @@ fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
     let (mut objects, mut lost) = (Vec::new(), Ok(()));
     for experiment in chosen {
         let context = Context { file, ..Context::new(&config, input.seed, input.progress()) };
-        let Some(mut outcome) = part.run(experiment, &context, input.quiet)? else { continue };
+        let mut outcome = records.run(experiment, &context, input.quiet)?;
         let motor = input.motor.as_deref().map(Motor::find).transpose()?;
         outcome.remarks.extend(motor.and_then(|motor| motor.remark()));
         let command = match file {

@@ -68,7 +68,7 @@ pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
     if config.drive.tracks_synchronously() { learned(config, drive, seed) } else { Ok(Ok(drive)) }
 }
 
-/// The runs, with the cases in alternation, so that each shard has its part of each case.
+/// The runs, with the cases in alternation.
 pub struct FullRange {
     config: Config,
     seed: u64,

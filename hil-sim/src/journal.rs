@@ -1,5 +1,10 @@
-//! Files of finished runs as JSON Lines: a head, followed by one line per run. A process that is killed while it writes
-//! leaves a torn last line.
+//! The finished runs of a statistical experiment in a file, from which an interrupted experiment continues.
+//!
+//! The file is JSON Lines: a head, followed by one line per run. A process that is killed while it writes leaves a torn
+//! last line.
+
+mod header;
+mod rows;
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Seek as _, SeekFrom, Write as _};
@@ -7,8 +12,44 @@ use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
 
-use super::{Header, Run, Shard};
+pub use header::Header;
+pub use rows::rows;
+
+use crate::experiments::statistics::Statistical;
 use crate::prelude::*;
+
+/// A run and its record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Its number, from 0.
+    pub run: usize,
+    /// Its record.
+    pub record: Value,
+}
+
+/// Does the runs that are not stored yet, and returns all `count` runs in their order.
+///
+/// # Errors
+/// The errors of the experiment; [`Error::Write`] if the journal cannot be written.
+pub fn runs(
+    statistical: &Statistical,
+    context: &Context<'_>,
+    count: usize,
+    journal: Option<&Journal>,
+) -> Result<Vec<Run>, Error> {
+    let stored = journal.map(|journal| journal.runs.clone()).unwrap_or_default();
+    let missing: Vec<usize> = (0..count).filter(|run| !stored.contains_key(run)).collect();
+    let done = Mutex::new(stored);
+    (statistical.some)(context, &missing, &|run, record| {
+        let run = Run { run, record };
+        journal.map_or(Ok(()), |journal| journal.append(&run))?;
+        done.lock().unwrap_or_else(PoisonError::into_inner).insert(run.run, run.record);
+        Ok(())
+    })?;
+    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(done.into_iter().map(|(run, record)| Run { run, record }).collect())
+}
 
 /// The contents of a file.
 #[derive(Default)]
@@ -70,7 +111,7 @@ impl Lines {
 pub struct Journal {
     /// Its path.
     pub path: PathBuf,
-    /// The runs that were stored when it was opened, in this file and in the others of the folder.
+    /// The runs that were stored when it was opened.
     pub runs: BTreeMap<usize, Value>,
     /// Number of the line that was torn.
     pub torn: Option<u64>,
@@ -78,50 +119,34 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens or makes the file for `--resume PLACE`, and removes a torn last line. The place is the file itself or a
-    /// folder, in which each shard has its own file; the runs in all files of the experiment with this seed count. No
-    /// other process can open the same file at the same time.
+    /// Opens or makes the file for `--resume FILE`, and removes a torn last line. No other process can open the same
+    /// file at the same time.
     ///
     /// # Errors
-    /// [`Error::Write`] if a file cannot be read or written; [`Error::Refused`] while another process writes it;
-    /// [`Error::Data`] if it belongs to another run. On an error no file is changed.
-    pub fn open(place: &Path, shard: Shard, header: &Header) -> Result<Self, Error> {
-        let text = place.to_string_lossy();
-        let is_folder = place.is_dir() || text.ends_with(std::path::is_separator);
-        let name = format!("{}-seed-{}-{shard}.jsonl", header.experiment, header.seed);
-        let path = if is_folder { place.join(name) } else { place.to_owned() };
-        let mut runs = Vec::new();
-        let others = is_folder.then(|| std::fs::read_dir(place)).into_iter().flatten().flatten();
-        for other in others.flatten().map(|other| other.path()) {
-            if other != path && other.extension().is_some_and(|end| end == "jsonl") {
-                let bytes = bounded::bytes(&other, bounded::RUNS_MIB);
-                let bytes = bytes.map_err(|e| Error::data(&other, None, e.to_string()))?;
-                if header.is_of(&bytes) {
-                    runs.extend(Lines::of(&other, &bytes, header)?.runs);
-                }
-            }
-        }
+    /// [`Error::Write`] if the file cannot be opened or written; [`Error::Refused`] while another process writes it;
+    /// [`Error::Data`] if it cannot be read, or belongs to another run. On an error the file is not changed.
+    pub fn open(path: &Path, header: &Header) -> Result<Self, Error> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder {
             std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
         }
         let options =
-            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
-        let mut file = options.map_err(Error::write(&path))?;
+            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
+        let mut file = options.map_err(Error::write(path))?;
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             let path = path.display();
             return Err(Error::Refused(format!("{path}: another process writes it")));
         }
-        let bytes = bounded::read(&file, bounded::RUNS_MIB).map_err(Error::write(&path))?;
-        let Lines { runs: own, torn, good } = Lines::of(&path, &bytes, header)?;
-        runs.extend(own);
-        file.set_len(good).map_err(Error::write(&path))?;
-        file.seek(SeekFrom::End(0)).map_err(Error::write(&path))?;
+        let bytes = bounded::read(&file, bounded::RUNS_MIB);
+        let bytes = bytes.map_err(|e| Error::data(path, None, e.to_string()))?;
+        let Lines { runs, torn, good } = Lines::of(path, &bytes, header)?;
+        file.set_len(good).map_err(Error::write(path))?;
+        file.seek(SeekFrom::End(0)).map_err(Error::write(path))?;
         if good == 0 {
-            file.write_all(&line(header)?).map_err(Error::write(&path))?;
+            file.write_all(&line(header)?).map_err(Error::write(path))?;
         }
         let runs = runs.into_iter().map(|run| (run.run, run.record)).collect();
-        Ok(Self { path, file: Mutex::new(file), runs, torn })
+        Ok(Self { path: path.to_owned(), file: Mutex::new(file), runs, torn })
     }
 
     /// Adds a run at once.
@@ -136,7 +161,7 @@ impl Journal {
 }
 
 /// Writes a head or a run as a line.
-pub fn line(of: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
+fn line(of: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
     let mut line = serde_json::to_vec(of).map_err(|e| Error::Internal(e.to_string()))?;
     line.push(b'\n');
     Ok(line)
@@ -174,14 +199,14 @@ mod tests {
     #[test]
     fn a_file_cut_at_any_byte_keeps_all_whole_lines() {
         let place = Place::new("journal-cut");
-        let journal = Journal::open(&place.0, Shard::WHOLE, &header(1)).unwrap();
+        let journal = Journal::open(&place.0, &header(1)).unwrap();
         let runs = [run(1), run(5), run(3)];
         runs.iter().for_each(|run| journal.append(run).unwrap());
         drop(journal);
         let whole = std::fs::read(&place.0).unwrap();
         for length in 0..=whole.len() {
             std::fs::write(&place.0, &whole[..length]).unwrap();
-            let journal = Journal::open(&place.0, Shard::WHOLE, &header(1)).unwrap();
+            let journal = Journal::open(&place.0, &header(1)).unwrap();
             let lines = whole[..length].iter().filter(|&&byte| byte == b'\n').count();
             let kept = runs[..lines.saturating_sub(1)].iter();
             let kept = kept.map(|run| (run.run, run.record.clone())).collect();
@@ -198,7 +223,7 @@ mod tests {
     #[test]
     fn files_of_others_are_refused_and_left_as_they_are() {
         let place = Place::new("journal-other");
-        drop(Journal::open(&place.0, Shard::WHOLE, &header(2)).unwrap());
+        drop(Journal::open(&place.0, &header(2)).unwrap());
         let of_seed_2 = std::fs::read_to_string(&place.0).unwrap();
         let damaged = format!("{of_seed_2}{{\"run\":1,\"rec\n{{\"run\":3,\"record\":1}}\n");
         let beyond = format!("{of_seed_2}{{\"run\":8,\"record\":1}}\n{{\"run\":3,\"record\":1}}\n");
@@ -210,8 +235,7 @@ mod tests {
         ];
         for (text, seed, expected) in cases {
             std::fs::write(&place.0, text).unwrap();
-            let error =
-                Journal::open(&place.0, Shard::WHOLE, &header(seed)).err().unwrap().to_string();
+            let error = Journal::open(&place.0, &header(seed)).err().unwrap().to_string();
             assert!(error.contains(expected) && error.contains("runs.jsonl"), "{error}");
             assert_eq!(std::fs::read_to_string(&place.0).unwrap(), text);
         }
@@ -220,8 +244,8 @@ mod tests {
     #[test]
     fn two_processes_do_not_write_the_same_file() {
         let place = Place::new("journal-lock");
-        let _first = Journal::open(&place.0, Shard::WHOLE, &header(1)).unwrap();
-        let error = Journal::open(&place.0, Shard::WHOLE, &header(1)).err().unwrap().to_string();
+        let _first = Journal::open(&place.0, &header(1)).unwrap();
+        let error = Journal::open(&place.0, &header(1)).err().unwrap().to_string();
         assert!(error.ends_with("runs.jsonl: another process writes it"), "{error}");
     }
 }

@@ -20,7 +20,7 @@ pub struct Header {
     pub seed: u64,
     /// The changed settings.
     pub settings: BTreeMap<String, Json>,
-    /// Number of runs of all shards.
+    /// Number of runs.
     pub runs: usize,
 }
 
@@ -44,13 +44,6 @@ impl Header {
             settings: Origin::new(seed, &changes).typed_settings().collect(),
             runs,
         })
-    }
-
-    /// Whether a file begins with the head of a run of this experiment with this seed.
-    pub fn is_of(&self, file: &[u8]) -> bool {
-        let head = file.split(|&byte| byte == b'\n').next();
-        let head = head.and_then(|line| serde_json::from_slice::<Self>(line).ok());
-        head.is_some_and(|head| head.experiment == self.experiment && head.seed == self.seed)
     }
 
     /// Returns the first difference between two headers whose runs do not belong together, `NAME is ..., there ...`.

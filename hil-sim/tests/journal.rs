@@ -1,0 +1,159 @@
+//! Stored runs of statistical experiments: continued runs that give the whole, byte for byte; refusals; rows.
+
+use std::path::Path;
+
+use crate::cli_common::{folder, hil_sim, object, text};
+
+/// Every statistical experiment, with options that make it small.
+const SMALL: [(&str, &str); 9] = [
+    ("monte-carlo", "--set runs=7 --seconds 0.2 --set spread.motor=0.1 --set drive.motor.r_s=5"),
+    ("machines", "--set runs=2 --set spread.machine=1.5 --seconds 0.2"),
+    ("commission", "--set runs=4"),
+    ("commission-refusals", "--set runs=1"),
+    ("battery", "--set runs=14 --set disturbed.drawn=0.5 --set after.motor.r_r=1.2"),
+    ("full-range", "--set runs=1 --set full_range.kind=constant --set angle_source=encoder"),
+    ("lock-monitor", "--set runs=1"),
+    ("smallest-slope", "--set runs=1"),
+    ("foreign-motors", "--set runs=3"),
+];
+
+/// A small run whose outcome depends on every record.
+const MONTE_CARLO: &[&str] = &["run", "monte-carlo", "--set", "runs=6", "--seconds", "0.1", "-q"];
+
+fn run(folder: &Path, name: &str, options: &[&str], more: &[&str]) -> Vec<u8> {
+    let output = hil_sim(folder, &[&["run", name, "-q"], options, more].concat());
+    assert!(output.stderr.is_empty(), "{name}: {}", text(&output.stderr));
+    output.stdout
+}
+
+#[test]
+fn every_statistical_experiment_is_in_the_list() {
+    for experiment in hil_sim::experiments::EXPERIMENTS.iter() {
+        let is_stored = SMALL.iter().any(|(name, _)| *name == experiment.name);
+        assert_eq!(experiment.study.is_some(), is_stored, "{}", experiment.name);
+        // The runs of all experiments with a number of runs can be stored.
+        let takes_runs = experiment.uses.contains(&"runs");
+        assert!(!takes_runs || is_stored, "{}", experiment.name);
+    }
+}
+
+/// Whether even its smallest run takes ten seconds.
+fn is_long(name: &str) -> bool {
+    ["smallest-slope", "foreign-motors"].contains(&name)
+}
+
+/// Interrupts each experiment after the first third of its runs, and compares the continued run with an uninterrupted
+/// one: percentiles, tables, figures and all.
+fn continued_runs_are_the_whole_run(which: impl Fn(&str) -> bool) {
+    for (name, options) in SMALL.into_iter().filter(|(name, _)| which(name)) {
+        let options: &[&str] = &options.split(' ').collect::<Vec<_>>();
+        let folder = folder(&format!("journal-{name}"));
+        let journal = ["--json", "--seed", "5", "--resume", "runs.jsonl"];
+        let whole = run(&folder, name, options, &journal[..3]);
+        assert_eq!(text(&run(&folder, name, options, &journal)), text(&whole), "{name}");
+        let path = folder.join("runs.jsonl");
+        let kept = std::fs::read_to_string(&path).unwrap();
+        let lines: Vec<&str> = kept.split_inclusive('\n').collect();
+        let (head, runs) = lines.split_first().unwrap();
+        // In another order.
+        let stored = runs[..runs.len().div_ceil(3)].iter().rev().copied();
+        let stored: String = std::iter::once(*head).chain(stored).collect();
+        std::fs::write(&path, &stored).unwrap();
+        assert_eq!(text(&run(&folder, name, options, &journal)), text(&whole), "{name}");
+        let continued = std::fs::read_to_string(&path).unwrap();
+        assert!(continued.starts_with(&stored), "{name}: stored runs are not done again");
+        assert_eq!(continued.lines().count(), lines.len(), "{name}");
+    }
+}
+
+#[test]
+fn continued_runs_are_the_whole_run_byte_for_byte() {
+    continued_runs_are_the_whole_run(|name| !is_long(name));
+}
+
+#[test]
+#[ignore = "cargo xtask prove long-tests"]
+fn continued_runs_of_the_long_experiments_are_the_whole_run() {
+    continued_runs_are_the_whole_run(is_long);
+}
+
+/// A file is refused by its name, and left as it is, if it belongs to another run.
+#[test]
+fn files_of_other_runs_are_refused_by_name() {
+    let folder = folder("journal-refused");
+    let resume = [MONTE_CARLO, &["--json", "--resume", "runs.jsonl"]].concat();
+    hil_sim(&folder, &resume);
+    let path = folder.join("runs.jsonl");
+    let kept = std::fs::read_to_string(&path).unwrap();
+    let version = format!("\"version\":\"{}\"", env!("CARGO_PKG_VERSION"));
+    let refused = |text: &str, more: &[&str], part: &str| {
+        std::fs::write(&path, text).unwrap();
+        let output = hil_sim(&folder, &[&resume[..], more].concat());
+        let message = self::text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains("runs.jsonl") && message.contains(part), "{part}: {message}");
+        assert!(output.stdout.is_empty() && std::fs::read_to_string(&path).unwrap() == text);
+    };
+    refused(&kept, &["--set", "motor.r_s=6"], "motor.r_s is 6, there not set");
+    refused(&kept, &["--set", "runs=7"], "runs is 7, there 6");
+    refused(&kept.replace(&version, "\"version\":\"0.0.7\""), &[], "there 0.0.7");
+    refused(&kept.replace("\"sources\":\"", "\"sources\":\"0"), &[], "there 0");
+    refused(&kept.replace("\"run\":4", "\"run\":6"), &[], "no record of this run");
+}
+
+/// The records of the file count: a changed record appears in the outcome, so its run was not done again; a torn one is.
+#[test]
+fn finished_runs_are_not_done_again_and_a_torn_line_is() {
+    let folder = folder("journal-resume");
+    let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat()).stdout;
+    let resumed =
+        || hil_sim(&folder, &[MONTE_CARLO, &["--json", "--resume", "runs/kept.jsonl"]].concat());
+    let first = resumed();
+    assert_eq!((text(&first.stdout), text(&first.stderr)), (text(&whole), ""));
+    let path = folder.join("runs/kept.jsonl");
+    let kept = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(kept.lines().count(), 7, "a head and six runs");
+
+    let marked = kept.replacen("\"lost\":false", "\"lost\":true", 1);
+    std::fs::write(&path, &marked).unwrap();
+    let output = resumed();
+    assert_eq!(object(&output)["metrics"]["lost_runs"], 1.0);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), marked);
+
+    std::fs::write(&path, &kept[..kept.len() - 30]).unwrap();
+    let output = resumed();
+    assert_eq!(text(&output.stdout), text(&whole));
+    let note = "runs/kept.jsonl, line 7, was torn; its run is done again";
+    assert!(text(&output.stderr).contains(note), "{}", text(&output.stderr));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), kept);
+
+    let other = ["--json", "--resume", "runs/kept.jsonl", "--seed", "2"];
+    let output = hil_sim(&folder, &[MONTE_CARLO, &other].concat());
+    let message = text(&output.stderr);
+    assert!(
+        message.contains("here seed is 2, there 1") && output.status.code() == Some(2),
+        "{message}"
+    );
+}
+
+/// One row per run, with its random values and its results.
+#[test]
+fn rows_of_runs_can_be_analysed() {
+    let folder = folder("journal-rows");
+    let all = hil_sim(&folder, &[MONTE_CARLO, &["--json", "--rows", "all.csv"]].concat());
+    assert_eq!(all.status.code(), Some(0), "{}", text(&all.stderr));
+    let table = std::fs::read_to_string(folder.join("all.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 7);
+    let column = |name: &str| rows[0].iter().position(|head| *head == name).expect(name);
+    let number = |row: usize, name: &str| rows[row][column(name)].parse::<f64>().unwrap();
+    assert_eq!((number(3, "run"), number(3, "case_seed")), (2.0, 1_000_005.0));
+    assert!((0.5..=3.0).contains(&number(3, "case_iq_a").abs()));
+    let page = include_str!("../../docs/simulator.md");
+    assert!(rows[0].iter().all(|head| page.contains(&format!("`{head}`"))), "{:?}", rows[0]);
+    // The worst of the rows is the worst of the result.
+    let worst = (1..7).map(|row| number(row, "error_rms_deg")).fold(0.0, f64::max);
+    assert_eq!(object(&all)["metrics"]["worst_run_rms_deg"], worst);
+    let output = hil_sim(&folder, &["run", "torque-steps", "--rows", "x.csv"]);
+    assert!(text(&output.stderr).contains("does not consist of independent runs"));
+}
