@@ -1,22 +1,18 @@
 //! The virtual board: tests with the finished image on an emulated controller, faults, and the execution time of its control interrupt.
 
-use std::fs;
 use std::path::Path;
 use std::process::Command;
 
 use anyhow::Result;
 use clap::Args;
 
-use crate::{budget, image, run, times, toolchain};
+use crate::{budget, image, run, toolchain};
 
 /// Environment variable by which the tests find the image.
 pub const ELF: &str = "INDUCTION_DRIVE_ELF";
 
 /// Environment variable by which the tests find the images of the other boards: a folder with one folder per board.
 const BOARDS: &str = "INDUCTION_DRIVE_BOARDS";
-
-/// Environment variable with the file to which each board appends the seconds that it simulated.
-const SIMULATED: &str = "INDUCTION_DRIVE_SIMULATED";
 
 /// Faults of a whole campaign; `cargo xtask test` injects a twentieth.
 pub const CAMPAIGN: u32 = 2000;
@@ -25,10 +21,8 @@ pub const CAMPAIGN: u32 = 2000;
 pub fn test(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let mut command = cargo("test --release --tests --no-fail-fast");
-    let simulated = run::target_dir()?.join("simulated.txt");
-    fs::write(&simulated, "")?;
-    command.env(ELF, elf).env(BOARDS, run::folder(image::BOARDS)?).env(SIMULATED, &simulated);
-    times::beside_simulated("the images on the virtual board", command, &simulated)
+    command.env(ELF, elf).env(BOARDS, run::folder(image::BOARDS)?);
+    run::step("the images on the virtual board", &mut command)
 }
 
 /// Format, lints and documentation of the virtual board, in the profile of its tests, so that the emulator is built once.

@@ -18,7 +18,8 @@ pub struct Budgets {
     pub part: Vec<Part>,
     /// Modules of the firmware that an image may leave out, by folder: feature, and most files outside the folder that name it.
     pub modules: BTreeMap<String, (String, usize)>,
-    pub seconds: Seconds,
+    /// Time limit of each command, seconds on two quiet cores.
+    pub seconds: BTreeMap<String, u32>,
     pub cycles: Cycles,
 }
 
@@ -39,15 +40,6 @@ pub struct Part {
     pub paths: Vec<String>,
     /// Most lines of code, if the part has a budget of its own.
     pub code: Option<usize>,
-}
-
-/// Time limits, seconds on two quiet cores.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Seconds {
-    pub test_module: f64,
-    /// Time limit of each command, from a cold clone.
-    pub commands: BTreeMap<String, u32>,
 }
 
 /// Estimated cycles of the control interrupt.

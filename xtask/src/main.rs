@@ -24,7 +24,6 @@ mod sections;
 mod size;
 mod sources;
 mod stack;
-mod times;
 mod toolchain;
 mod tools;
 mod uses;
@@ -178,9 +177,8 @@ fn run(task: Task) -> Result<()> {
 fn quick() -> Result<()> {
     let mut steps = run::Steps::new();
     before_tests(&mut steps);
-    let unit = run::cargo("test --lib --bins --no-fail-fast");
-    steps.run("unit tests", || times::test("unit tests", unit));
-    steps.run("procedures", || times::test("procedures", run::cargo("test --test procedures")));
+    steps.command("unit tests", run::cargo("test --lib --bins --no-fail-fast"));
+    steps.command("procedures", run::cargo("test --test procedures"));
     steps.end("cargo xtask quick", None)
 }
 
@@ -237,7 +235,7 @@ fn test() -> Result<()> {
 
     let rest = "--test page --test clones --bin xtask --no-fail-fast";
     let rest = run::cargo(&format!("test {} {rest}", run::TESTED));
-    steps.run("tests of page and tasks", || times::test("tests of page and tasks", rest));
+    steps.command("tests of page and tasks", rest);
     let tables = ["commands_of", "the_page_prints", "every_printed", "the_errata", "the_figures"];
     let mut documents = run::cargo("test --test simulator --");
     documents.args(["--ignored", "--nocapture"]).args(tables);
@@ -257,7 +255,7 @@ fn test() -> Result<()> {
     steps.with(elf, "cycles of the control interrupt", board::cycles);
 
     let command = "cargo xtask test";
-    steps.end(command, budget::read()?.seconds.commands.get(command).copied())?;
+    steps.end(command, budget::read()?.seconds.get(command).copied())?;
     println!("\nPASSED: everything but the host tests, which are `cargo test`");
     Ok(())
 }
