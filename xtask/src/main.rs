@@ -11,7 +11,6 @@ mod fuzz;
 mod image;
 mod lines;
 mod map;
-mod modules;
 mod paths;
 mod prove;
 mod python;
