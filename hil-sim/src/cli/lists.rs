@@ -109,16 +109,17 @@ fn motor_text(motor: &Motor) -> Result<String, Error> {
     let mut config = Config::default();
     motor.apply(&mut config)?;
     let mut table = Table::new("", &["key", "value", "unit", "source"]);
-    for (key, value) in motor.settings() {
-        let unit = Key::named(&key)?.first().map_or("", |key| key.unit()).to_owned();
+    for (key, _) in motor.settings() {
+        let known = Key::named(&key)?[0];
         let source = motor.source_of(&key).map_or("no source stated".to_owned(), |source| {
             format!("{}{}", if source.unverified { "UNVERIFIED: " } else { "" }, source.from)
         });
-        table.row([key, value.to_string(), unit, source].map(Cell::from));
+        let value = known.get(&config).to_string();
+        table.row([key, value, known.unit().to_owned(), source].map(Cell::from));
     }
     for (key, value, why) in motor.implied(&config) {
         let unit = Key::named(key)?.first().map_or("", |key| key.unit());
-        table.row([key, &value.to_string(), unit, why].map(Cell::from));
+        table.row([key, &value, unit, why].map(Cell::from));
     }
     let Motor { name, title, about, .. } = motor;
     let (about, table) = (about.trim(), report::table(&table));
