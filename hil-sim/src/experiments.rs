@@ -18,7 +18,6 @@ mod record;
 pub mod scenario;
 mod sensorless_position;
 mod shaft;
-mod smallest_slope;
 mod torque_envelope;
 pub mod torque_limit;
 mod torque_rise;
@@ -72,7 +71,6 @@ pub static EXPERIMENTS: LazyLock<Vec<Experiment>> = LazyLock::new(|| Vec::from([
     Experiment::new("record", record::run),
     Experiment::new("torque-rise", torque_rise::run),
     Experiment::new("shaft", shaft::run),
-    Experiment::study::<smallest_slope::SmallestSlope>(),
     Experiment::study::<foreign_motors::ForeignMotors>(),
     Experiment::new("identify-discrete", identify_discrete::run),
     Experiment::new("identify-continuous", identify_continuous::run),

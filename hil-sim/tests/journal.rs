@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::cli_common::{folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
-const SMALL: [(&str, &str); 9] = [
+const SMALL: [(&str, &str); 8] = [
     ("monte-carlo", "--set runs=7 --seconds 0.2 --set spread.motor=0.1 --set drive.motor.r_s=5"),
     ("machines", "--set runs=2 --set spread.machine=1.5 --seconds 0.2"),
     ("commission", "--set runs=4"),
@@ -13,7 +13,6 @@ const SMALL: [(&str, &str); 9] = [
     ("battery", "--set runs=14 --set disturbed.drawn=0.5 --set after.motor.r_r=1.2"),
     ("full-range", "--set runs=1 --set full_range.kind=constant --set angle_source=encoder"),
     ("lock-monitor", "--set runs=1"),
-    ("smallest-slope", "--set runs=1"),
     ("foreign-motors", "--set runs=3"),
 ];
 
@@ -39,7 +38,7 @@ fn every_statistical_experiment_is_in_the_list() {
 
 /// Whether even its smallest run takes ten seconds.
 fn is_long(name: &str) -> bool {
-    ["smallest-slope", "foreign-motors"].contains(&name)
+    name == "foreign-motors"
 }
 
 /// Interrupts each experiment after the first third of its runs, and compares the continued run with an uninterrupted

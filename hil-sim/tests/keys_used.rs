@@ -166,15 +166,12 @@ fn observed(experiment: &Experiment) -> Vec<Key> {
     used
 }
 
-/// An experiment that consists of the stress test and uses the same keys; it takes longer than all others.
-const LONG: &str = "smallest-slope";
-
-/// Returns the experiments that `ONLY` selects; all but [`LONG`] without it.
+/// Returns the experiments that `ONLY` selects; all without it.
 fn chosen() -> impl Iterator<Item = &'static Experiment> {
     let only = std::env::var("ONLY").unwrap_or_default();
     EXPERIMENTS.iter().filter(move |experiment| {
         let chosen = only.split(',').any(|name| name == experiment.name);
-        chosen || only.is_empty() && experiment.name != LONG
+        chosen || only.is_empty()
     })
 }
 

@@ -254,3 +254,30 @@ fn both_leakages_saturate_as_measured_on_every_motor() {
         }
     }
 }
+
+/// The sensitivity of model A at standstill is twice its saliency; with linear teeth and with saturation it decreases
+/// with its source.
+#[test]
+fn a_weaker_source_is_a_smaller_sensitivity() {
+    let slope = |plant: &str, share: f64| {
+        let mut config = Config::default();
+        config.set("plant", plant).expect(plant);
+        let plant = plant_settings(&config);
+        match plant.iron {
+            Some(iron) => {
+                config.iron.teeth = Some(share * iron.teeth);
+                config.iron.saturation = Some(1.0 + share * (iron.saturation - 1.0));
+            }
+            None => config.saliency.a_psi = share * plant.saliency.a_psi,
+        }
+        let probe = Probe::new(&config).expect("a motor");
+        probe.slope(probe.i_d, 0.0).expect("a steady state")
+    };
+    for share in [1.0, 0.3] {
+        let expected = -2.0 * 0.035 * share;
+        assert!((slope("a", share) / expected - 1.0).abs() < 0.05, "{}", slope("a", share));
+    }
+    for plant in ["r", "g7", "m6"] {
+        assert!(slope(plant, 0.5).abs() < 0.8 * slope(plant, 1.0).abs(), "{plant}");
+    }
+}

@@ -29,7 +29,6 @@ const SHORT: &[(&str, &[&str])] = &[
     ("lock-monitor", &["runs=8"]),
     ("monte-carlo", &["runs=12"]),
     ("record", &["record.minutes=0.1", "record.reversal_s=5"]),
-    ("smallest-slope", &["runs=2"]),
 ];
 
 /// Returns the result of an experiment of this name from a program.
