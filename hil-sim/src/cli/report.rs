@@ -1,39 +1,12 @@
 //! All experiments on one page.
 
-use std::sync::Mutex;
-
 use super::run::Run;
 use super::{say, used};
 use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, EXPERIMENTS};
 use crate::outcome::Origin;
 use crate::prelude::*;
-use crate::progress::ProgressBar;
 use crate::report::{self, Section};
-
-/// Shows the names of the running experiments.
-struct Running<'a> {
-    bar: &'a ProgressBar,
-    names: Mutex<Vec<&'static str>>,
-}
-
-impl Running<'_> {
-    fn change(&self, change: impl FnOnce(&mut Vec<&'static str>)) {
-        // A panic in another thread ends the program anyway.
-        if let Ok(mut names) = self.names.lock() {
-            change(&mut names);
-            self.bar.set_message(names.join(", "));
-        }
-    }
-
-    fn run(&self, experiment: &Experiment, context: &Context<'_>) -> Outcome {
-        self.change(|names| names.push(experiment.name));
-        let outcome = experiment.run(context).unwrap_or_else(|error| Outcome::refused(&error));
-        self.change(|names| names.retain(|name| *name != experiment.name));
-        self.bar.inc(1);
-        outcome
-    }
-}
 
 /// Subject of a page.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -60,9 +33,12 @@ fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> 
     used::check("report", experiments, input)?;
     let context = Context::new(&config, input.seed, input.progress());
     let bar = context.progress.bar("report", experiments.len() as u64);
-    let running = Running { bar: &bar, names: Mutex::default() };
-    let outcomes: Vec<Outcome> =
-        experiments.par_iter().map(|experiment| running.run(experiment, &context)).collect();
+    let run = |experiment: &&Experiment| {
+        let outcome = experiment.run(&context).unwrap_or_else(|error| Outcome::refused(&error));
+        bar.inc(1);
+        outcome
+    };
+    let outcomes: Vec<Outcome> = experiments.par_iter().map(run).collect();
     drop(bar);
 
     let mut evidence = Evidence::default();
