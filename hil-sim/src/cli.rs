@@ -2,7 +2,6 @@
 #![deny(clippy::use_debug)]
 
 mod lists;
-mod records;
 mod report;
 mod run;
 mod used;

@@ -4,7 +4,6 @@
 //! last line.
 
 mod header;
-mod rows;
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Seek as _, SeekFrom, Write as _};
@@ -13,7 +12,6 @@ use std::sync::{Mutex, PoisonError};
 use serde_json::Value;
 
 pub use header::Header;
-pub use rows::rows;
 
 use crate::experiments::statistics::Statistical;
 use crate::prelude::*;
@@ -28,27 +26,26 @@ pub struct Run {
     pub record: Value,
 }
 
-/// Does the runs that are not stored yet, and returns all `count` runs in their order.
+/// Does the runs of an experiment that are not stored yet, and returns the records of all runs in their order.
 ///
 /// # Errors
 /// The errors of the experiment; [`Error::Write`] if the journal cannot be written.
-pub fn runs(
+pub fn records(
     statistical: &Statistical,
     context: &Context<'_>,
-    count: usize,
-    journal: Option<&Journal>,
-) -> Result<Vec<Run>, Error> {
-    let stored = journal.map(|journal| journal.runs.clone()).unwrap_or_default();
-    let missing: Vec<usize> = (0..count).filter(|run| !stored.contains_key(run)).collect();
-    let done = Mutex::new(stored);
+    journal: &Journal,
+) -> Result<Vec<Value>, Error> {
+    let missing: Vec<usize> =
+        (0..journal.count).filter(|run| !journal.runs.contains_key(run)).collect();
+    let done = Mutex::new(journal.runs.clone());
     (statistical.some)(context, &missing, &|run, record| {
         let run = Run { run, record };
-        journal.map_or(Ok(()), |journal| journal.append(&run))?;
+        journal.append(&run)?;
         done.lock().unwrap_or_else(PoisonError::into_inner).insert(run.run, run.record);
         Ok(())
     })?;
     let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-    Ok(done.into_iter().map(|(run, record)| Run { run, record }).collect())
+    Ok(done.into_values().collect())
 }
 
 /// The contents of a file.
@@ -111,6 +108,8 @@ impl Lines {
 pub struct Journal {
     /// Its path.
     pub path: PathBuf,
+    /// Number of runs of the experiment.
+    pub count: usize,
     /// The runs that were stored when it was opened.
     pub runs: BTreeMap<usize, Value>,
     /// Number of the line that was torn.
@@ -146,7 +145,7 @@ impl Journal {
             file.write_all(&line(header)?).map_err(Error::write(path))?;
         }
         let runs = runs.into_iter().map(|run| (run.run, run.record)).collect();
-        Ok(Self { path: path.to_owned(), file: Mutex::new(file), runs, torn })
+        Ok(Self { path: path.to_owned(), count: header.runs, file: Mutex::new(file), runs, torn })
     }
 
     /// Adds a run at once.

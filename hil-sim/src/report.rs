@@ -16,7 +16,7 @@ use sim_bench::outcome::Origin;
 use sim_bench::prelude::*;
 
 pub use console::{paragraph, table, text};
-pub use csv::{csv, of_table};
+pub use csv::csv;
 pub use page::{Section, page};
 pub use plot::svg;
 

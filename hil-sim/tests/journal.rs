@@ -1,4 +1,4 @@
-//! Stored runs of statistical experiments: continued runs that give the whole, byte for byte; refusals; rows.
+//! Stored runs of statistical experiments: continued runs that give the whole, byte for byte; refusals; records.
 
 use std::path::Path;
 
@@ -135,24 +135,34 @@ fn finished_runs_are_not_done_again_and_a_torn_line_is() {
     );
 }
 
-/// One row per run, with its random values and its results.
+/// The file has the random values and the results of each run, by the names that the documentation explains.
 #[test]
-fn rows_of_runs_can_be_analysed() {
-    let folder = folder("journal-rows");
-    let all = hil_sim(&folder, &[MONTE_CARLO, &["--json", "--rows", "all.csv"]].concat());
+fn records_of_runs_can_be_analysed() {
+    let folder = folder("journal-records");
+    let all = hil_sim(&folder, &[MONTE_CARLO, &["--json", "--resume", "runs.jsonl"]].concat());
     assert_eq!(all.status.code(), Some(0), "{}", text(&all.stderr));
-    let table = std::fs::read_to_string(folder.join("all.csv")).unwrap();
-    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
-    assert_eq!(rows.len(), 7);
-    let column = |name: &str| rows[0].iter().position(|head| *head == name).expect(name);
-    let number = |row: usize, name: &str| rows[row][column(name)].parse::<f64>().unwrap();
-    assert_eq!((number(3, "run"), number(3, "case_seed")), (2.0, 1_000_005.0));
-    assert!((0.5..=3.0).contains(&number(3, "case_iq_a").abs()));
+    let kept = std::fs::read_to_string(folder.join("runs.jsonl")).unwrap();
+    let mut runs: Vec<serde_json::Value> =
+        kept.lines().skip(1).map(|line| serde_json::from_str(line).unwrap()).collect();
+    runs.sort_by_key(|run| run["run"].as_u64());
+    assert_eq!(runs.len(), 6);
+    let third = &runs[2]["record"];
+    assert_eq!((&runs[2]["run"], &third["case"]["seed"]), (&2.into(), &1_000_005.into()));
+    assert!((0.5..=3.0).contains(&third["case"]["iq_a"].as_f64().unwrap().abs()));
     let page = include_str!("../../docs/simulator.md");
-    assert!(rows[0].iter().all(|head| page.contains(&format!("`{head}`"))), "{:?}", rows[0]);
-    // The worst of the rows is the worst of the result.
-    let worst = (1..7).map(|row| number(row, "error_rms_deg")).fold(0.0, f64::max);
+    for (name, value) in third.as_object().unwrap() {
+        let inner = value.as_object().into_iter().flatten();
+        let names = inner.map(|(inner, _)| format!("`{name}.{inner}`")).collect::<Vec<_>>();
+        let names = if names.is_empty() { vec![format!("`{name}`")] } else { names };
+        assert!(names.iter().all(|name| page.contains(name)), "{names:?}");
+    }
+    // The worst of the records is the worst of the result.
+    let rms = |run: &serde_json::Value| {
+        let of = |name: &str| run["record"]["error"][name].as_f64().unwrap();
+        (of("squares") / of("count")).sqrt()
+    };
+    let worst = runs.iter().map(rms).fold(0.0, f64::max);
     assert_eq!(object(&all)["metrics"]["worst_run_rms_deg"], worst);
-    let output = hil_sim(&folder, &["run", "torque-steps", "--rows", "x.csv"]);
+    let output = hil_sim(&folder, &["run", "torque-steps", "--resume", "x.jsonl"]);
     assert!(text(&output.stderr).contains("does not consist of independent runs"));
 }

@@ -2,11 +2,11 @@
 
 use trace::Voltages;
 
-use super::records::Records;
 use super::{say, used};
 use crate::config::motors::Motor;
 use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, TRACE, identify_trace as trace, scenario};
+use crate::journal::{self, Header, Journal};
 use crate::outcome::{self, Origin};
 use crate::passport;
 use crate::prelude::*;
@@ -26,7 +26,7 @@ pub struct Output {
     pub csv: Option<PathBuf>,
 }
 
-/// A requested run: its experiment, input, files of single runs, and output.
+/// A requested run: its experiment, input and output.
 #[derive(Args, Default)]
 pub struct Request {
     /// Name of the experiment as in `list`, or the TOML file of a scenario
@@ -36,8 +36,9 @@ pub struct Request {
     pub file: Option<PathBuf>,
     #[command(flatten)]
     pub input: Input,
-    #[command(flatten)]
-    pub records: Records,
+    /// Keep every finished run of a statistical experiment in this file, and do not repeat the runs that are there
+    #[arg(long, value_name = "FILE")]
+    pub resume: Option<PathBuf>,
     #[command(flatten)]
     pub output: Output,
 }
@@ -162,9 +163,9 @@ pub fn json(name: String, file: Option<PathBuf>, input: Input) -> Result<String,
 /// Returns the JSON objects of the results, if requested, and whether one of the runs failed.
 ///
 /// # Errors
-/// As [`experiments::find`], [`Input::config`], [`used::check`] and [`Records::run`]; the errors of the experiment; [`Error::Write`].
+/// As [`experiments::find`], [`Input::config`], [`used::check`] and [`resumed`]; the errors of the experiment; [`Error::Write`].
 fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
-    let Request { name, input, records, output, .. } = request;
+    let Request { name, input, resume, output, .. } = request;
     let own = scenario::own(name);
     let chosen: Vec<_> = match &own {
         Some(own) => vec![own],
@@ -181,7 +182,10 @@ fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
     let (mut objects, mut lost) = (Vec::new(), Ok(()));
     for experiment in chosen {
         let context = Context { file, ..Context::new(&config, input.seed, input.progress()) };
-        let mut outcome = records.run(experiment, &context, input.quiet)?;
+        let mut outcome = match resume {
+            Some(path) => resumed(path, experiment, &context, input.quiet)?,
+            None => experiment.run(&context)?,
+        };
         let motor = input.motor.as_deref().map(Motor::find).transpose()?;
         outcome.remarks.extend(motor.and_then(|motor| motor.remark()));
         let command = match file {
@@ -194,6 +198,34 @@ fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
         lost = lost.and(check_lost(experiment.name, &outcome));
     }
     Ok((objects, lost))
+}
+
+/// Runs a statistical experiment whose finished runs are in a file.
+///
+/// # Errors
+/// As [`experiments::statistical`], [`Journal::open`] and [`journal::records`].
+fn resumed(
+    path: &Path,
+    experiment: &Experiment,
+    context: &Context<'_>,
+    quiet: bool,
+) -> Result<Outcome, Error> {
+    let statistical = experiments::statistical(experiment)?;
+    let all = (statistical.runs)(context)?;
+    let header = Header::new(experiment.name, context.config, context.seed, all)?;
+    let journal = Journal::open(path, &header)?;
+    let path = message(path.display());
+    // A torn line is reported even in quiet mode.
+    if let Some(line) = journal.torn {
+        eprintln!("note: {path}, line {line}, was torn; its run is done again");
+    }
+    let done = journal.runs.len();
+    if done > 0 && !quiet {
+        eprintln!("note: {done} of {all} runs are stored already");
+    }
+    let records = journal::records(statistical, context, &journal)?;
+    let outcome = (statistical.outcome)(context, records)?;
+    Ok(experiment.remarked(outcome, context.config))
 }
 
 /// Identifies the motor from a trace.

@@ -55,7 +55,7 @@ fn of_figure(figure: &Figure) -> Result<String, Error> {
 ///
 /// # Errors
 /// As [`csv()`].
-pub fn of_table(table: &Table) -> Result<String, Error> {
+fn of_table(table: &Table) -> Result<String, Error> {
     let mut taken = Vec::new();
     let mut head = |label: &String| match snake(label) {
         none if none.is_empty() => unique("item".to_owned(), &mut taken),
