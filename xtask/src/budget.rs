@@ -18,8 +18,6 @@ pub struct Budgets {
     pub part: Vec<Part>,
     /// Modules of the firmware that an image may leave out, by folder: feature, and most files outside the folder that name it.
     pub modules: BTreeMap<String, (String, usize)>,
-    /// Time limit of each command, seconds on two quiet cores.
-    pub seconds: BTreeMap<String, u32>,
     pub cycles: Cycles,
 }
 

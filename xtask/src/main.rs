@@ -178,7 +178,7 @@ fn quick() -> Result<()> {
     before_tests(&mut steps);
     steps.command("unit tests", run::cargo("test --lib --bins --no-fail-fast"));
     steps.command("procedures", run::cargo("test --test procedures"));
-    steps.end("cargo xtask quick", None)
+    steps.end("cargo xtask quick")
 }
 
 /// Format, modules, lines and lints of the main workspace.
@@ -253,8 +253,7 @@ fn test() -> Result<()> {
     });
     steps.with(elf, "cycles of the control interrupt", board::cycles);
 
-    let command = "cargo xtask test";
-    steps.end(command, budget::read()?.seconds.get(command).copied())?;
+    steps.end("cargo xtask test")?;
     println!("\nPASSED: everything but the host tests, which are `cargo test`");
     Ok(())
 }

@@ -173,11 +173,11 @@ impl Steps {
         passed
     }
 
-    /// Prints the result of every step, and the time limit of the whole command, seconds.
+    /// Prints the result and the time of every step and of the whole command.
     ///
     /// # Errors
     /// The steps that failed or were not run, with the reasons.
-    pub fn end(&self, command: &str, budget: Option<u32>) -> Result<()> {
+    pub fn end(&self, command: &str) -> Result<()> {
         println!("\n{:<34}{:>8}  result", "step", "seconds");
         let mut failed = Vec::new();
         for (name, time, ended) in &self.ended {
@@ -195,9 +195,7 @@ impl Steps {
             println!("{name:<34}{:>8.0}  {result}", time.as_secs_f64());
         }
         let seconds = self.began.elapsed().as_secs_f64();
-        let of =
-            budget.map(|budget| format!("  of {budget}, from a cold clone")).unwrap_or_default();
-        println!("{command:<34}{seconds:>8.0}{of}");
+        println!("{command:<34}{seconds:>8.0}");
         let all = self.ended.len();
         ensure!(failed.is_empty(), "{} of {all} steps:\n{}", failed.len(), failed.join("\n"));
         Ok(())
@@ -269,7 +267,7 @@ mod tests {
         assert!(ran);
         let names: Vec<_> = steps.ended.iter().map(|(name, ..)| *name).collect();
         assert_eq!(names, ["one", "image", "size", "last"]);
-        let error = steps.end("a task", None).unwrap_err().to_string();
+        let error = steps.end("a task").unwrap_err().to_string();
         assert_eq!(error, "2 of 4 steps:\nimage: no linker\nsize: not run");
     }
 
