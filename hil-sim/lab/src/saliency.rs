@@ -193,7 +193,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             by_q < by_d,
         ),
     ] {
-        outcome.compared.push(beside("section 5.1", quantity).simulated(holds));
+        let ours = beside("section 5.1", quantity).unknown("the saliency of its motor");
+        outcome.compared.push(ours.simulated(holds));
     }
     let slopes = currents.map(|i_q| probe.slope(probe.i_d, i_q));
     if let Some(slope) = slopes[0] {
