@@ -574,6 +574,27 @@ class Picture:
             extra += f' style="fill:{fill}"'
         self.add(f'<path d="{data}" stroke="{color}" stroke-width="{width}" stroke-linejoin="round"{extra}/>')
 
+    def box(self, x, y, w, h, lines, color):
+        self.add(f'<rect x="{x}" y="{y}" width="{w}" height="{h}" rx="5" fill="{color}" fill-opacity="0.08" stroke="{color}" stroke-width="1.6"/>')
+        for n, text in enumerate(lines):
+            self.text(x + w / 2, y + h / 2 + 5 + 17 * (n - (len(lines) - 1) / 2), text, color if n == 0 else GREY, "middle", "" if n == 0 else "s")
+
+    def chain(self, x, y, names, color=BLUE, gap=17, h=34, back=False):
+        """Draws boxes in a row, joined by arrows, from the right to the left if `back`; returns where the row ends."""
+        for n, (name, w) in enumerate(names):
+            x -= w if back else 0
+            self.box(x, y, w, h, [name], color)
+            x += 0 if back else w
+            if n < len(names) - 1:
+                step = -gap if back else gap
+                self.line(x, y + h / 2, x + step, y + h / 2, color, 1.6, arrow=True)
+                x += step
+        return x
+
+    def sum(self, x, y, color=INK):
+        self.add(f'<circle cx="{x}" cy="{y}" r="9" fill="#fff" stroke="{color}" stroke-width="1.6"/>')
+        self.text(x, y + 5, "+", color, "middle")
+
     def dot(self, x, y, color=INK, r=4, hollow=False):
         fill = "#fff" if hollow else color
         self.add(f'<circle cx="{num(x)}" cy="{num(y)}" r="{r}" fill="{fill}" stroke="{color}" stroke-width="2"/>')
@@ -976,12 +997,7 @@ def picture_system():
     """From the mains to the shaft, and the drive between the current sensors and the gates."""
     p = Picture("system", "From the mains to the shaft: rectifier, dc link, inverter, motor; below, the drive with its two sources of the flux angle")
     p.height = 372
-
-    def box(x, y, w, h, lines, color):
-        p.add(f'<rect x="{x}" y="{y}" width="{w}" height="{h}" rx="5" fill="{color}" fill-opacity="0.08" stroke="{color}" stroke-width="1.6"/>')
-        for n, text in enumerate(lines):
-            p.text(x + w / 2, y + h / 2 + 5 + 17 * (n - (len(lines) - 1) / 2), text, color if n == 0 else GREY, "middle", "" if n == 0 else "s")
-
+    box = p.box
     p.text(8, 50, "mains", GREY, style="s")
     p.line(8, 60, 46, 60, GREY, 1.5, arrow=True)
     box(48, 34, 82, 52, ["rectifier"], GREY)
@@ -1017,6 +1033,120 @@ def picture_system():
     p.line(190, 276, 190, 216, INK, 1.8)
     p.line(190, 216, 195, 216, INK, 1.8, arrow=True)
     p.text(156, 346, "flux angle φ", INK, style="s")
+    return p
+
+
+def picture_source_vectors():
+    """Figures 7 and 8: the injection along the flux and off it, and the current's parts along dm and qm."""
+    p = Picture("source-vectors", "Figures 7 and 8: the current of an injection along the flux has equal parts along dm and qm; off the flux it has not")
+    p.height = 290
+    share, unit = 0.3, 100
+    for x0, off, name in [(104, 0, "along the flux: equal parts"), (322, -25, "25° off: unequal parts")]:
+        y0, flux = 196, math.radians(62)
+        at = lambda z: (x0 + unit * z.real, y0 - unit * z.imag)
+        theta = flux + math.radians(off)
+        x = flux - theta
+        # (S2) in the frame of the injection axis
+        y_d, y_q = 1 - share, 1 + share
+        i = complex(y_d * math.cos(x) ** 2 + y_q * math.sin(x) ** 2, (y_d - y_q) * math.sin(x) * math.cos(x)) * cmath.exp(1j * theta)
+        p.line(*at(0), *at(1.5 * cmath.exp(1j * flux)), GREY, 1.3, "7 4", arrow=True)
+        p.text(*at(1.56 * cmath.exp(1j * flux)), "flux, φ", GREY, "middle" if off else "end", "s")
+        for name_axis, turn in [("dm", -45), ("qm", 45)]:
+            axis = cmath.exp(1j * (theta + math.radians(turn)))
+            p.line(*at(0), *at(1.3 * axis), INK, 1.1, "3 3")
+            p.text(at(1.36 * axis)[0], at(1.36 * axis)[1] + 5, name_axis, INK, "middle", "s")
+            part = (i * axis.conjugate()).real
+            p.line(*at(i), *at(part * axis), BLUE, 1.1, "3 3")
+            p.line(*at(0), *at(part * axis), GREEN, 4)
+        p.line(*at(0), *at(1.22 * cmath.exp(1j * theta)), ORANGE, 2.2, arrow=True)
+        p.text(at(1.3 * cmath.exp(1j * theta))[0] + 6, at(1.3 * cmath.exp(1j * theta))[1] + 8, "v, θ", ORANGE, style="s")
+        p.line(*at(0), *at(i), BLUE, 2.6, arrow=True)
+        p.text(x0 + 14, 236, name, INK, "middle")
+    p.text(10, 262, "orange: injected voltage; blue: its current, with a saliency of 30 %;", GREY, style="s")
+    p.text(10, 280, "green: the parts of the current along dm and qm", GREY, style="s")
+    return p
+
+
+def picture_source_schemes():
+    """Figures 9 and 20: the schemes of Ha and Sul and of the dissertation."""
+    p = Picture("source-schemes", "Figures 9 and 20: where the injection enters, how the currents are filtered, and where the angle comes from, in the scheme of Ha and Sul and in the dissertation's")
+    p.height = 482
+    for y, name, forward, sum_after, low, high, out in [
+        (0, "Figure 9: Ha and Sul, injection along the flux", [("PI", 42), ("e^jφ̂", 52), ("SVM", 52), ("motor", 62)], 0, [("e^−jφ̂", 62), ("F1", 40)], [("e^−j(φ̂−45°)", 104), ("F2", 40), ("rms(v)/rms(i), F3, PII", 164)], "φ̂"),
+        (242, "Figure 20: the dissertation, injection across the flux", [("PI", 42), ("e^jφ̂", 52), ("SVM", 52), ("motor", 62)], 1, [("LPF", 46), ("e^−jφ̂", 62)], [("BPF", 46), ("e^−j(θ−45°), Re − Im", 168), ("PP", 40), ("PII", 42)], "θ, and φ̂ = θ − 90°"),
+    ]:
+        p.text(10, y + 22, name, INK, style="b")
+        p.text(8, y + 62, "i_ref", GREY, style="s")
+        p.line(38, y + 67, 56, y + 67, GREY, 1.6, arrow=True)
+        p.sum(66, y + 67)
+        p.line(75, y + 67, 91, y + 67, BLUE, 1.6, arrow=True)
+        x = 92
+        for n, (block, w) in enumerate(forward):
+            p.box(x, y + 50, w, 34, [block], BLUE)
+            x += w
+            if n == sum_after:
+                p.line(x, y + 67, x + 16, y + 67, BLUE, 1.6, arrow=True)
+                p.sum(x + 26, y + 67, ORANGE)
+                p.line(x + 26, y + 40, x + 26, y + 57, ORANGE, 1.6, arrow=True)
+                p.text(x + 38, y + 42, "v cos Ωt" if n == 0 else "v cos Ωt e^jθ", ORANGE, style="s")
+                x += 35
+            if n < len(forward) - 1:
+                p.line(x, y + 67, x + 16, y + 67, BLUE, 1.6, arrow=True)
+                x += 17
+        p.line(x, y + 67, x + 16, y + 67, BLUE, 1.6)
+        p.line(x + 16, y + 67, x + 16, y + 187, BLUE, 1.6)
+        p.text(x + 22, y + 100, "i_αβ", BLUE, style="s")
+        p.line(x + 16, y + 127, 300, y + 127, BLUE, 1.6, arrow=True)
+        end = p.chain(299, y + 110, low, BLUE, back=True)
+        p.line(end, y + 127, 66, y + 127, BLUE, 1.6)
+        p.line(66, y + 127, 66, y + 77, BLUE, 1.6, arrow=True)
+        p.text(74, y + 92, "−", BLUE)
+        p.line(x + 16, y + 187, 385, y + 187, ORANGE, 1.6, arrow=True)
+        end = p.chain(384, y + 170, high, ORANGE, back=True)
+        p.line(end, y + 187, end - 16, y + 187, ORANGE, 1.6, arrow=True)
+        p.text(10, y + 226, f"the last block gives {out}", ORANGE, style="s")
+    return p
+
+
+def picture_source_angle_loop():
+    """Figures 33 and 34: the chain that the PII closes, and its replacement by one transfer function."""
+    p = Picture("source-angle-loop", "Figures 33 and 34: PII, modulator, motor, band-pass, rotation, difference and post-processing filter in a loop; below, all but the PII as one transfer function of two poles")
+    p.height = 316
+    p.text(10, 22, "Figure 33: the loop of the injection", INK, style="b")
+    p.add(f'<rect x="140" y="34" width="332" height="122" rx="5" fill="{GREY}" fill-opacity="0.10" stroke="{GREY}" stroke-dasharray="6 4"/>')
+    p.text(464, 52, "φ(z)", GREY, "end")
+    p.chain(74, 62, [("PII", 46), ("SVM, v cos Ωt e^jθ", 150), ("motor", 62)], ORANGE, 36)
+    p.text(126, 58, "θ", ORANGE, style="s")
+    p.line(402, 96, 402, 114, ORANGE, 1.6, arrow=True)
+    end = p.chain(466, 116, [("BPF", 110), ("Re − Im", 76), ("PP", 50)], ORANGE, 17, back=True)
+    p.line(end, 133, 44, 133, ORANGE, 1.6)
+    p.text(60, 128, "Δi", ORANGE, style="s")
+    p.line(44, 133, 44, 89, ORANGE, 1.6, arrow=True)
+    p.sum(44, 79, ORANGE)
+    p.text(30, 103, "−", ORANGE, "end")
+    p.line(53, 79, 72, 79, ORANGE, 1.6, arrow=True)
+    p.line(8, 79, 34, 79, GREY, 1.6, arrow=True)
+    p.text(4, 66, "10 mA", GREY, style="s")
+    p.text(10, 198, "Figure 34: the same with (3.43) in its place", INK, style="b")
+    p.line(8, 245, 34, 245, GREY, 1.6, arrow=True)
+    p.text(4, 232, "10 mA", GREY, style="s")
+    p.sum(44, 245, ORANGE)
+    p.line(53, 245, 72, 245, ORANGE, 1.6, arrow=True)
+    p.chain(74, 228, [("PII", 46)], ORANGE)
+    p.line(120, 245, 154, 245, ORANGE, 1.6, arrow=True)
+    p.text(128, 238, "θ", ORANGE, style="s")
+    p.sum(164, 245, ORANGE)
+    p.line(164, 218, 164, 235, GREY, 1.6, arrow=True)
+    p.text(172, 222, "angle of the flux", GREY, style="s")
+    p.text(150, 264, "−", ORANGE)
+    p.line(173, 245, 206, 245, ORANGE, 1.6, arrow=True)
+    p.box(208, 226, 190, 38, ["φ = k / ((z − p₁)(z − p₂))"], GREY)
+    p.line(398, 245, 440, 245, ORANGE, 1.6)
+    p.text(410, 238, "Δi", ORANGE, style="s")
+    p.line(440, 245, 440, 290, ORANGE, 1.6)
+    p.line(440, 290, 44, 290, ORANGE, 1.6)
+    p.line(44, 290, 44, 255, ORANGE, 1.6, arrow=True)
+    p.text(30, 270, "−", ORANGE, "end")
     return p
 
 
@@ -1501,6 +1631,7 @@ def main_saliency(factor, n):
 DRAWN = [
     picture_ellipse, picture_q, picture_sensitivity, picture_false_lock, picture_observability, picture_leak, picture_resistance,
     picture_noise, picture_loop, picture_torque_map, picture_system,
+    picture_source_vectors, picture_source_schemes, picture_source_angle_loop,
 ]
 
 
