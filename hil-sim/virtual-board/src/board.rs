@@ -9,7 +9,6 @@ mod options;
 mod outside;
 pub mod poison;
 pub mod rom;
-pub mod simulated;
 pub mod snapshot;
 mod terminals;
 
@@ -68,8 +67,6 @@ pub struct Board {
     pub longest_to_compares: LongestPath,
     /// Longest time from its request to its first instruction, ticks.
     pub latest_start: u64,
-    /// Simulated time that was undone by going back to snapshots, ticks.
-    gone_back: u64,
 }
 
 /// Progress while a board runs.
@@ -124,7 +121,6 @@ impl Board {
             longest: LongestPath::default(),
             longest_to_compares: LongestPath::default(),
             latest_start: 0,
-            gone_back: 0,
         };
         let chip = board.chip();
         chip.set_clocks(0.0, LSI_HZ);

@@ -23,7 +23,7 @@ use clap::Args;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::board::{Board, simulated};
+use crate::board::Board;
 use crate::power_stage::{PowerStage, REFERENCE};
 use crate::{chip::TICKS_PER_PERIOD, image::Image, periph::Reset};
 use class::{Class, Run};
@@ -129,8 +129,7 @@ pub fn run(
     let most = (count as usize * without.len() / 100).max(1);
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(most);
     std::thread::scope(|scope| {
-        let workers = (0..workers).map(|_| simulated::worker().spawn_scoped(scope, work));
-        let started: Vec<_> = workers.collect::<std::io::Result<_>>()?;
+        let started: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
         started
             .into_iter()
             .try_for_each(|one| one.join().map_err(|_| anyhow!("a worker panicked"))?)

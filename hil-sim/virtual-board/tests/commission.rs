@@ -3,7 +3,6 @@
 use anyhow::{Context as _, Result, bail};
 use hil_sim::Config;
 use hil_sim::experiments::drawn_machine::{Circuit, drawn};
-use virtual_board::board::simulated;
 use virtual_board::{Board, Image, Options};
 
 /// Number of machines, unless the environment variable `MACHINES` sets another.
@@ -99,8 +98,7 @@ fn random_machines_are_commissioned_by_the_image() {
     let share = |n| (1 + n..=machines).step_by(threads as usize).map(commissioned);
     let results: Vec<_> = std::thread::scope(|scope| {
         let work = |n| move || share(n).collect::<Vec<_>>();
-        let workers = (0..threads).map(|n| simulated::worker().spawn_scoped(scope, work(n)));
-        let workers: Vec<_> = workers.map(|worker| worker.expect("a thread")).collect();
+        let workers: Vec<_> = (0..threads).map(|n| scope.spawn(work(n))).collect();
         workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect()
     });
     let mut worst = Vec::new();

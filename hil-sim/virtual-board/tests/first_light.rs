@@ -25,7 +25,7 @@ use hil_sim::first_light::wire::{Port, Wire};
 use hil_sim::plant::Load;
 use induction_drive::board::{ADC_FULL_SCALE, protection};
 use induction_drive::boards::Level;
-use virtual_board::board::{Debugger, simulated, snapshot::Snapshot};
+use virtual_board::board::{Debugger, snapshot::Snapshot};
 use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
 use virtual_board::{Board, Counting, Image, Options, dump};
@@ -573,7 +573,7 @@ impl Begun {
         let table = Table::read()?;
         let bench = lab.bench();
         // Tests of one step and defect run at the same time.
-        let test = simulated::test().replace("::", "-");
+        let test = std::thread::current().name().unwrap_or("unnamed").replace("::", "-");
         let name = format!("{test}-{}-{:?}-{step}", bench.stage.name, bench.defect);
         drop(bench);
         let file = folder(&name).join("evidence.toml");

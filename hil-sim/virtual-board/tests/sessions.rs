@@ -11,7 +11,6 @@ use std::sync::mpsc::channel;
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use hil_sim::Config;
 use hil_sim::board::LogLevel;
-use hil_sim::config::Value;
 use hil_sim::experiments::drawn_machine::drawn;
 use induction_drive::board::protection;
 use virtual_board::board::rom::N_SWBOOT0;
@@ -245,7 +244,7 @@ fn power_up(value: &str) -> Result<Session> {
             "image" => image = value,
             "seed" => seed = value.parse()?,
             "drawn" => config = drawn(&Config::default(), value.parse()?),
-            key if key.contains('.') => config.set(key, &Value::from_text(value))?,
+            key if key.contains('.') => config.set(key, value)?,
             _ => {}
         }
     }

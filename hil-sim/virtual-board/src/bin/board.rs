@@ -131,6 +131,7 @@ fn write(options: &Options, config: &Config, session: &Session) -> Result<PathBu
         stands_for: "virtual board",
         about: page::ABOUT,
         command: options.command(config),
+        open: true,
         outcome: &outcome,
     };
     let origin = Origin::new(options.input.seed, &config.changes());

@@ -41,7 +41,6 @@ impl Board {
     /// The core cannot go back.
     pub fn go_back(&mut self, to: &Snapshot) -> Result<()> {
         self.cpu.go_back(&to.core).map_err(|e| anyhow!("emulator: {e:?}"))?;
-        self.gone_back += self.cpu.chip().now - to.chip.now;
         let forgiving = self.cpu.chip().forgiving;
         *self.cpu.chip_mut() = to.chip.clone();
         self.cpu.chip_mut().forgiving = forgiving;

@@ -4,12 +4,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 
-use virtual_board::board::simulated;
-
 /// Returns a session that writes to a folder.
 pub fn command(out: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_board"));
-    command.env(simulated::TEST, simulated::test());
     command.arg("--out").arg(out).args(arguments);
     command
 }
