@@ -14,6 +14,7 @@ pub mod passport;
 mod prelude;
 mod random;
 pub mod report;
+mod repository;
 pub mod sessions;
 
 pub use sim_bench::{

@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 
 use crate::prelude::*;
+use crate::repository;
 
 /// Time between two lines of [`while_saying`].
 const INTERVAL: Duration = Duration::from_secs(10);
@@ -95,14 +96,9 @@ fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Returns the repository around this program, or otherwise around the current folder. A shipped program contains no
-/// path of the machine that built it.
-pub(crate) fn root() -> Result<PathBuf, Error> {
-    let places = [std::env::current_exe(), std::env::current_dir()];
-    let mut folders = places.iter().flatten().flat_map(|place| place.ancestors());
-    let root = folders.find(|folder| folder.join("hil-sim/virtual-board").is_dir());
+fn root() -> Result<PathBuf, Error> {
     let refused = "the virtual board is built in the repository: change to it";
-    root.map(Path::to_owned).ok_or_else(|| Error::Refused(refused.into()))
+    repository::root().ok_or_else(|| Error::Refused(refused.into()))
 }
 
 #[cfg(test)]

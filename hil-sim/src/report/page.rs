@@ -5,9 +5,9 @@ use std::process::Command;
 
 use super::plot;
 use super::prose::{escape, number, prose};
-use crate::board::build;
 use crate::error::Error;
 use crate::outcome::{Cell, Metrics, Origin, Outcome, Table, name};
+use crate::repository;
 
 /// An experiment and its outcome.
 pub struct Section<'a> {
@@ -62,7 +62,7 @@ pub fn page(title: &str, origin: &Origin, sections: &[Section<'_>]) -> Result<St
 fn commit() -> String {
     let describe = ["describe", "--always", "--dirty", "--abbrev=10"];
     let git = |root| Command::new("git").args(describe).current_dir(root).output().ok();
-    let found = build::root().ok().and_then(git).filter(|output| output.status.success());
+    let found = repository::root().and_then(git).filter(|output| output.status.success());
     let commit = found.map_or_else(|| b"unknown".to_vec(), |output| output.stdout);
     let commit = escape(String::from_utf8_lossy(&commit).trim());
     format!(" (sources {}, commit {commit})", env!("HIL_SIM_SOURCES"))
