@@ -154,6 +154,7 @@ fn the_inertia_is_found_with_a_free_shaft() {
         );
         assert!(error.abs() < 0.03, "{inertia} {friction}: {error}");
         assert_eq!(found.motor.r_s, settings.motor.r_s, "nothing else is touched");
+        assert_eq!(found.speed, settings.speed, "a rigid shaft: {told:?}");
     }
     // A locked shaft.
     let mut config = Config::default();
