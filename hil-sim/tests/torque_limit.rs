@@ -72,7 +72,9 @@ fn the_page_prints_the_torque_limits() {
     let least = others.iter().copied().fold(f64::MAX, f64::min);
     let most = others.iter().copied().fold(0.0, f64::max);
     assert!(most - least < 1.0, "one number is enough for all: {others:?}");
-    let sentence = format!("[others](docs/performance.md#torque-at-standstill) {least:.0} %,");
+    let sentence = format!(
+        "[other motors](docs/performance.md#torque-at-standstill) reach up to {least:.0} %,"
+    );
     assert!(first.contains(&sentence), "README.md: {sentence}");
     generated::check("performance.md", "torque", &table);
 }
