@@ -58,6 +58,8 @@ pub struct Cpu {
     faulted: Rc<Cell<Option<u32>>>,
     trapped: Rc<Cell<bool>>,
     guard: Option<guard::Guard>,
+    /// Number of the next blocks that may begin with the state of a finished IT block.
+    suspects: Rc<Cell<u8>>,
     /// Set when a block has to begin again, see [`is_stale`].
     again: Rc<Cell<bool>>,
     /// The hook for reads from the code area of the flash.
@@ -73,6 +75,8 @@ pub struct CoreState {
     memories: Vec<(u32, Vec<u8>)>,
 }
 
+/// Blocks after a stop of the core of which the first may lie in an IT block: its four instructions, and the one after it.
+const AFTER_STOP: u8 = 5;
 /// Size of the pieces, bytes, that are compared before they are written, because written code is translated again.
 const PIECE: usize = 256;
 /// Longest time between two operations of the flash, ticks: 100 ms.
@@ -141,15 +145,19 @@ impl Cpu {
         let mut costs = Costs::new(memory::FLASH, flash_size, |instruction| instruction.cycles);
         let mut fast = Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
         let mut last = 0;
-        // Whether a page was looked up since the last block, and whether the begun block must begin again.
-        let (looked_up, again) = (Rc::new(Cell::new(false)), Rc::new(Cell::new(false)));
-        let (page, stale) = (Rc::clone(&looked_up), Rc::clone(&again));
+        // The number of blocks of which the first instructions may be mistaken, and whether the begun block must begin again.
+        let (suspects, again) = (Rc::new(Cell::new(0_u8)), Rc::new(Cell::new(false)));
+        let (looked_up, begun) = (Rc::clone(&suspects), Rc::clone(&suspects));
+        let stale = Rc::clone(&again);
         uc.add_block_hook(from.into(), end, move |uc, address, size| {
             let address = address as u32;
-            if page.replace(false) && is_stale(uc, address) {
-                stale.set(true);
-                uc.emu_stop().ok();
-                return;
+            if let Some(left) = begun.get().checked_sub(1) {
+                begun.set(left);
+                if is_stale(uc, address) {
+                    stale.set(true);
+                    uc.emu_stop().ok();
+                    return;
+                }
             }
             match address {
                 memory::FLASH..memory::STORED => {
@@ -203,12 +211,12 @@ impl Cpu {
         }
         uc.ctl_tlb_type(TlbType::VIRTUAL)?;
         uc.add_tlb_hook(0, u64::MAX, move |_, paddr, access| {
-            looked_up.set(true);
+            looked_up.set(looked_up.get().max(1));
             let data = Permission::READ | Permission::WRITE;
             let perms = if access == MemType::FETCH { Permission::ALL } else { data };
             Some(TlbEntry { paddr, perms })
         })?;
-        Ok(Self { uc, faulted, trapped, again, guard: None, flash_reads: None })
+        Ok(Self { uc, faulted, trapped, suspects, again, guard: None, flash_reads: None })
     }
 
     /// Follows the flash: data reads from the code area are checked only while it is written or has a bad word, because
@@ -286,6 +294,7 @@ impl Cpu {
         self.trapped.set(false);
         self.chip_mut().first = true;
         self.chip_mut().core_runs = true;
+        self.suspects.set(AFTER_STOP);
         let result = loop {
             let pc = self.get(Register::PC);
             let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
@@ -379,7 +388,8 @@ fn stopped(uc: &mut Unicorn<Chip>, address: u32) -> bool {
 }
 
 /// Whether the emulator mistakes the first instructions of a block for those of a finished IT block. This happens if
-/// the conditional access in that block was the first one to a page since the emulator dropped its pages.
+/// the conditional access in that block was the first one to a page since the emulator dropped its pages, or if the core was
+/// stopped within that block, for example by an interrupt.
 #[cold]
 fn is_stale(uc: &mut Unicorn<Chip>, address: u32) -> bool {
     if uc.reg_read(Register::XPSR).unwrap_or(0) as u32 & IT_STATE == 0 {

@@ -61,6 +61,7 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
         }
     }
     let heard = board.take_console();
+    assert!(!heard.contains("last run: reset by software"), "the firmware has restarted: {heard}");
     let lines = heard.lines().count();
     assert!(heard.lines().all(|line| !line.starts_with("error")), "{heard}");
     assert!(lines + 5 > replies, "{lines} answers to {replies} lines");
