@@ -32,8 +32,8 @@ pub type Frame = heapless::Vec<u8, LONGEST>;
 pub trait Port {
     /// Sets rate and format of the bytes, and the address that the port answers for; cheap if they have not changed.
     fn set_line(&mut self, _: &Settings) {}
-    /// The next frame: bytes between two silent intervals.
-    fn receive(&mut self) -> Option<Frame> {
+    /// The next frame, if there is one and it `is_due`: bytes between two silent intervals.
+    fn receive(&mut self, _is_due: impl FnOnce() -> bool) -> Option<Frame> {
         None
     }
     /// Sends a frame, after the previous one.

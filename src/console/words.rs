@@ -40,7 +40,7 @@ impl Display for Refusal {
             Self::Unsaved => f.write_str("settings that were not saved would be lost: `save` first, or `reboot now`"),
             Self::Charged(volts) => write!(f, "the dc link has {volts:.0} V, and ST's loader drives a gate: {LOADER_DC_LINK_V} V at most"),
             Self::Hardware(key) => write!(f, "{} belongs to the hardware: set it at the console", key.name()),
-            Self::Ended => f.write_str("the drive has stopped for another reason: write a stop first"),
+            Self::Ended => f.write_str("a stop comes before a run: write 1 to 0x2000, or 6 to 0x6040"),
             Self::Held(why) => f.write_str(why),
             Self::Stopped => f.write_str("a stop came before the start"),
             Self::TooOften(s) => write!(f, "three faults of the power stage within 10 s: find the short circuit or the wrong wire; `clear` works in {s} s"),

@@ -5,9 +5,10 @@ use drive_core::{Stage, State};
 use crate::settings::{Commander, FirmwareSettings};
 
 /// A state of the CiA 402 state machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Power {
     /// The control does not run.
+    #[default]
     NotReadyToSwitchOn,
     /// Off, and the bus cannot start the drive.
     SwitchOnDisabled,

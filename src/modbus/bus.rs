@@ -3,19 +3,22 @@
 //! A run command holds until a stop. If the drive has stopped for another reason (console, time-out, fault), a master that repeats its
 //! run command starts it again only after it has written a stop.
 
-use drive_core::{Mode, Stop};
+use drive_core::{Mode, Stage, State, Stop};
 use modbus_core::Exception;
 
 use super::Port;
-use super::cia402;
+use super::cia402::{self, Event};
 use super::faults::FaultLog;
 use super::float::from_float;
-use super::registers::{COMMAND, CONTROL, FREQUENCY, RESET, RUN, SETTINGS, STAGED, View};
-use super::settings::Alive;
+use super::registers::{
+    COMMAND, CONTROL, FREQUENCY, MODE, RESET, RUN, SETTINGS, STAGED, VELOCITY, View,
+};
+use super::settings::{Alive, Settings, StopBy};
 use super::slave::{self, Registers, Words, Written};
 use crate::desk::Desk;
 use crate::desk::handle::DriveHandle;
 use crate::desk::order::{Order, Refusal};
+use crate::desk::power::Power;
 use crate::settings::Commander;
 use crate::settings::keys;
 use crate::settings::staging::{Assignments, MOST, SetError};
@@ -35,29 +38,33 @@ pub fn is_stop((at, word): Written) -> bool {
         // A release is a stop if the bus commands.
         COMMAND => word & ACTION == STOP || word == 0,
         RESET => word & BASE_BLOCK != 0,
-        CONTROL => cia402::stop(word).is_some(),
+        CONTROL => Event::of(word) != Event::EnableOperation,
         _ => false,
     }
 }
 
-/// The run command of the master.
-#[derive(Clone, Copy, Default, PartialEq)]
-enum Run {
-    /// None, or a stop.
-    #[default]
-    Stop,
-    /// A start was accepted; the controllers are being designed.
-    Starting,
-    /// The drive runs for the bus.
-    Running,
-    /// The drive has stopped, not by a stop of the bus.
-    Ended,
+/// A condition that is told once it has lasted for a while.
+#[derive(Default)]
+struct Lasting {
+    since_ms: Option<u32>,
+    told: bool,
+}
+
+impl Lasting {
+    fn follow(&mut self, is: bool, now_ms: u32, for_s: f32) {
+        let since = if is { Some(self.since_ms.unwrap_or(now_ms)) } else { None };
+        self.since_ms = since;
+        self.told = since.is_some_and(|at| now_ms.wrapping_sub(at) as f32 >= 1e3 * for_s);
+    }
 }
 
 /// The field bus, see the head of the module.
 #[derive(Default)]
 pub struct Bus {
-    run: Run,
+    /// The state of CiA 402 that the master's commands have led to. In [`Power::OperationEnabled`] a run command is in force.
+    power: Power,
+    /// Whether the drive has stopped during a run command, not by a stop of the bus. A run then needs a stop first.
+    ended: bool,
     reverse: bool,
     /// The frequency that was written last, 0.01 Hz.
     frequency: u16,
@@ -67,6 +74,10 @@ pub struct Bus {
     designs: u8,
     /// Whether the last control word of CiA 402 has the fault-reset bit: only the change to it resets a fault.
     resets: bool,
+    at_speed: Lasting,
+    standstill: Lasting,
+    /// Time at which a request was seen that waits for the delay before its answer, ms.
+    asked_ms: Option<u32>,
     faults: FaultLog,
     seconds: u32,
     second_ms: u32,
@@ -93,13 +104,27 @@ impl Bus {
             self.second_ms = self.second_ms.wrapping_add(1000);
             self.seconds += 1;
         }
-        if let Some(status) = drive.status() {
-            self.faults.watch(status.state, self.seconds);
+        let state = drive.status().map(|status| status.state);
+        if let Some(state) = state {
+            self.faults.watch(state, self.seconds);
         }
+        self.follow_drive(state, desk);
         if !desk.is_busy() {
             self.follow_run(desk, drive);
         }
-        let frame = port.receive();
+        let view = self.view(desk, drive);
+        let (reached, rests) = (view.is_at_reference(), view.is_at_standstill());
+        self.at_speed.follow(reached, now_ms, settings.steady_s);
+        self.standstill.follow(rests, now_ms, settings.steady_s);
+        // The request itself waits: its answer could not be kept without the memory of a frame.
+        let asked_ms = &mut self.asked_ms;
+        let frame = port.receive(|| {
+            let waited_ms = now_ms.wrapping_sub(*asked_ms.get_or_insert(now_ms));
+            waited_ms as f32 >= 1e3 * settings.delay_s
+        });
+        if frame.is_some() {
+            self.asked_ms = None;
+        }
         // The master has given up a request from before a design. An answer would be taken for the answer to another request.
         let late = desk.has_designed(&mut self.designs);
         let mut access = Access { bus: self, desk, drive, commanded: false };
@@ -127,18 +152,78 @@ impl Bus {
         }
     }
 
+    fn view<'a>(&'a self, desk: &'a Desk, drive: &impl DriveHandle) -> View<'a> {
+        let (status, settings) = (drive.status(), desk.settings().in_force());
+        View {
+            status,
+            desk,
+            settings,
+            command: self.command(),
+            power: self.shown(status.map(|status| status.state)),
+            at_speed: self.at_speed.told,
+            standstill: self.standstill.told,
+            frequency: self.frequency,
+            faults: &self.faults,
+            seconds: self.seconds,
+        }
+    }
+
+    /// Follows what happens to the drive without a command of the bus.
+    fn follow_drive(&mut self, state: Option<State>, desk: &Desk) {
+        let settings = desk.settings().in_force();
+        let may_start =
+            settings.command.commander == Commander::Bus && settings.board_is_confirmed();
+        let stage = state.map(State::stage);
+        let stopped = self.power == Power::QuickStopActive
+            && stage == Some(Stage::Off)
+            && !settings.modules.bus.quick_stop.stays();
+        let events = [
+            (stage.is_some(), Event::Ready),
+            (stage == Some(Stage::Fault), Event::Failed),
+            (stage != Some(Stage::Fault), Event::Cleared),
+            (stopped || !may_start, Event::Stopped),
+        ];
+        let ran = self.runs();
+        for (_, event) in events.into_iter().filter(|(happened, _)| *happened) {
+            self.power = cia402::after(self.power, event);
+        }
+        self.ended |= ran && !self.runs();
+    }
+
+    /// The state that the master reads: that of the drive, and while it is off, the state to which commands have led.
+    fn shown(&self, state: Option<State>) -> Power {
+        match (state.map(State::stage), self.power) {
+            (None, _) => Power::NotReadyToSwitchOn,
+            (Some(Stage::Fault), _) => Power::Fault,
+            (Some(Stage::Running), _) => Power::OperationEnabled,
+            (Some(Stage::Starting), _) | (Some(Stage::Off), Power::OperationEnabled) => {
+                Power::SwitchedOn
+            }
+            // A stop by ramp still regulates.
+            (Some(Stage::Stopping), Power::ReadyToSwitchOn | Power::SwitchedOn) => {
+                Power::OperationEnabled
+            }
+            (Some(Stage::Stopping), _) => Power::QuickStopActive,
+            (Some(Stage::Off), power) => power,
+        }
+    }
+
+    /// Whether a run command is in force.
+    fn runs(&self) -> bool {
+        self.power == Power::OperationEnabled
+    }
+
     /// Gives the drive the speed of a run command, and ends the command if the drive has stopped.
     fn follow_run(&mut self, desk: &mut Desk, drive: &mut impl DriveHandle) {
-        match self.run {
-            Run::Starting | Run::Running if drive.is_off() || drive.is_stopping() => {
-                self.run = Run::Ended;
-            }
-            Run::Starting | Run::Running => {
-                self.run = Run::Running;
-                // The answer has been given; a refusal is announced.
-                let _ = self.send_reference(desk, drive);
-            }
-            Run::Stop | Run::Ended => {}
+        if !self.runs() {
+            return;
+        }
+        if drive.is_off() || drive.is_stopping() {
+            self.ended = true;
+            self.power = cia402::after(self.power, Event::Stopped);
+        } else {
+            // The answer has been given; a refusal is announced.
+            let _ = self.send_reference(desk, drive);
         }
     }
 
@@ -160,7 +245,7 @@ impl Bus {
 
     fn command(&self) -> u16 {
         let direction = if self.reverse { REVERSE } else { FORWARD };
-        if matches!(self.run, Run::Running | Run::Starting) { RUN | direction } else { STOP }
+        if self.runs() { RUN | direction } else { STOP }
     }
 }
 
@@ -206,6 +291,8 @@ impl<D: DriveHandle> Access<'_, D> {
             FREQUENCY => self.frequency(word),
             RESET => self.reset(word),
             CONTROL => self.control(word),
+            MODE if word == VELOCITY => Ok(()),
+            MODE => Err(Exception::IllegalDataValue),
             STAGED => self.staged(word),
             _ => Err(Exception::IllegalDataAddress),
         }?;
@@ -218,7 +305,7 @@ impl<D: DriveHandle> Access<'_, D> {
             return Err(Exception::IllegalDataValue);
         }
         if word & BASE_BLOCK != 0 {
-            return self.stop(Stop::Now);
+            return self.stop(Stop::Now, Event::DisableVoltage);
         }
         if word == CLEAR { self.order(Order::Clear) } else { Ok(()) }
     }
@@ -230,7 +317,11 @@ impl<D: DriveHandle> Access<'_, D> {
         let commands = self.desk.commander() == Commander::Bus;
         // Anybody may stop the drive. A release by a master that does not command changes nothing.
         if word & ACTION == STOP || (word == 0 && commands) {
-            return self.stop(Stop::Coast);
+            let stop = match self.settings().stop {
+                StopBy::Ramp => Stop::Ramp,
+                StopBy::Coast => Stop::Coast,
+            };
+            return self.stop(stop, Event::Shutdown);
         }
         if word == 0 {
             return Ok(());
@@ -244,24 +335,25 @@ impl<D: DriveHandle> Access<'_, D> {
         };
         match word & ACTION {
             RUN => self.run(),
-            _ if self.bus.run == Run::Running => {
-                Ok(self.bus.send_reference(self.desk, self.drive)?)
-            }
-            _ => Ok(()),
+            _ => self.refer(),
         }
     }
 
+    /// Gives a run the speed, if one is in force.
+    fn refer(&mut self) -> Result<(), Exception> {
+        if self.bus.runs() { Ok(self.bus.send_reference(self.desk, self.drive)?) } else { Ok(()) }
+    }
+
     fn run(&mut self) -> Result<(), Exception> {
-        match self.bus.run {
-            Run::Starting => Ok(()),
-            Run::Running => Ok(self.bus.send_reference(self.desk, self.drive)?),
-            Run::Ended => self.refuse(Refusal::Ended),
-            Run::Stop => {
-                self.order(Order::Start(Mode::Speed))?;
-                (self.bus.run, self.bus.given) = (Run::Starting, None);
-                Ok(())
-            }
+        if self.bus.ended {
+            return self.refuse(Refusal::Ended);
         }
+        if !self.bus.runs() {
+            self.order(Order::Start(Mode::Speed))?;
+            (self.bus.power, self.bus.given) = (Power::OperationEnabled, None);
+            return Ok(());
+        }
+        self.refer()
     }
 
     /// Carries out a control word of CiA 402. A run keeps the direction.
@@ -270,26 +362,65 @@ impl<D: DriveHandle> Access<'_, D> {
         let before = core::mem::replace(&mut self.bus.resets, resets);
         if resets && !before {
             self.order(Order::Clear)?;
+            self.bus.power = cia402::after(self.bus.power, Event::Cleared);
         }
-        match cia402::stop(word) {
-            Some(stop) => self.stop(stop),
-            None => self.command(RUN),
+        let event = Event::of(word);
+        match event {
+            Event::DisableVoltage => self.stop(Stop::Now, event),
+            Event::QuickStop => self.stop(self.settings().quick_stop.stop(), event),
+            Event::Shutdown => self.stop(Stop::Ramp, event),
+            _ => self.enable(event),
         }
     }
 
-    fn stop(&mut self, stop: Stop) -> Result<(), Exception> {
-        self.bus.run = Run::Stop;
+    /// Carries out *switch on* and *enable operation*, if the state has a transition for them.
+    fn enable(&mut self, event: Event) -> Result<(), Exception> {
+        let stays = self.settings().quick_stop.stays();
+        let power = match self.state() {
+            // Without such an option code, a quick stop goes on to its end.
+            Power::QuickStopActive if !stays => Power::QuickStopActive,
+            state => cia402::after(state, event),
+        };
+        if event == Event::SwitchOn {
+            // While the drive runs, the same bits disable the operation.
+            return match power {
+                Power::SwitchOnDisabled | Power::QuickStopActive => self.refuse(Refusal::Ended),
+                _ => self.stop(Stop::Ramp, event),
+            };
+        }
+        self.may_command()?;
+        match power {
+            // The drive refuses a start with a latched fault and names it.
+            Power::OperationEnabled | Power::Fault => self.run(),
+            _ => self.refuse(Refusal::Ended),
+        }
+    }
+
+    /// The state to which the transitions apply: a drive that another interface runs is enabled.
+    fn state(&self) -> Power {
+        match (self.bus.power, self.drive.status().map(|status| status.state.stage())) {
+            (Power::SwitchOnDisabled, Some(Stage::Starting | Stage::Running)) => {
+                Power::OperationEnabled
+            }
+            (power, _) => power,
+        }
+    }
+
+    fn settings(&self) -> Settings {
+        self.desk.settings().in_force().modules.bus
+    }
+
+    /// Stops the drive, whatever its state, and follows the command's transition.
+    fn stop(&mut self, stop: Stop, event: Event) -> Result<(), Exception> {
+        self.bus.ended = false;
+        self.bus.power = cia402::after(self.state(), event);
         self.order(Order::Stop(stop))
     }
 
     fn frequency(&mut self, word: u16) -> Result<(), Exception> {
         self.may_command()?;
         self.bus.frequency = word;
-        if self.bus.run == Run::Running {
-            Ok(self.bus.send_reference(self.desk, self.drive)?)
-        } else {
-            Ok(())
-        }
+        self.refer()
     }
 
     fn may_command(&mut self) -> Result<(), Exception> {
@@ -341,17 +472,7 @@ impl<D: DriveHandle> Registers for Access<'_, D> {
     }
 
     fn read(&mut self, at: u16) -> Result<u16, Exception> {
-        let (desk, bus) = (&*self.desk, &*self.bus);
-        let view = View {
-            status: self.drive.status(),
-            desk,
-            settings: desk.settings().in_force(),
-            command: bus.command(),
-            frequency: bus.frequency,
-            faults: &bus.faults,
-            seconds: bus.seconds,
-        };
-        view.read(at)
+        self.bus.view(self.desk, self.drive).read(at)
     }
 
     fn write(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {

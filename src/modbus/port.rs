@@ -116,8 +116,8 @@ impl Port for Usart {
         }
     }
 
-    fn receive(&mut self) -> Option<Frame> {
-        self.received.take_with(Frame::clone)
+    fn receive(&mut self, is_due: impl FnOnce() -> bool) -> Option<Frame> {
+        self.received.take_if(|_| is_due(), |frame| frame.clone())
     }
 
     fn send(&mut self, frame: &Frame) {

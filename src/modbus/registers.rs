@@ -2,8 +2,8 @@
 //!
 //! A value of 32 bits takes two registers, the upper half first; a setting is a float, see [`float`](super::float).
 
-use drive_core::State;
 use drive_core::io::PERIOD_S;
+use drive_core::{Stage, State};
 use drive_settings::value::Words as _;
 use modbus_core::Exception;
 
@@ -29,6 +29,10 @@ pub const FREQUENCY: u16 = 0x2001;
 pub const RESET: u16 = 0x2002;
 /// The control word of CiA 402.
 pub const CONTROL: u16 = 0x6040;
+/// The mode of operation of CiA 402.
+pub const MODE: u16 = 0x6060;
+/// The only mode that may be written: velocity.
+pub const VELOCITY: u16 = 2;
 /// The signals of a trace: two registers each, by permanent number.
 pub const SIGNALS: u16 = 0x3000;
 const SIGNALS_END: u16 = 0x3200;
@@ -58,10 +62,9 @@ const STATE_STARTS: u16 = 0b10;
 const STATE_STOPS: u16 = 0b01;
 const TURNS_REVERSE: u16 = 0b11 << 3;
 const BY_BUS: u16 = 1 << 8 | 1 << 10;
+const AT_SPEED: u16 = 1 << 12;
+const STANDSTILL: u16 = 1 << 13;
 const SPEED_ASSUMED: u16 = 1 << 15;
-
-/// Speed counts as reached within this share of the largest.
-const REACHED: f32 = 0.01;
 
 /// State that the registers show.
 pub struct View<'a> {
@@ -73,6 +76,12 @@ pub struct View<'a> {
     pub settings: &'a FirmwareSettings,
     /// The command in force, as it would be written.
     pub command: u16,
+    /// The state of CiA 402.
+    pub power: Power,
+    /// Whether the speed has been reached for long enough.
+    pub at_speed: bool,
+    /// Whether the shaft has been at standstill for long enough.
+    pub standstill: bool,
     /// The frequency reference, 0.01 Hz.
     pub frequency: u16,
     /// The faults.
@@ -113,7 +122,7 @@ macro_rules! rows {
 }
 
 /// The registers except settings and faults, by number.
-pub static ROWS: [Row; 30] = rows! {
+pub static ROWS: [Row; 34] = rows! {
     0x0100: Number(100, |v| v.largest_hz()), "Hz", "largest frequency that is asked for, as 0x211B";
     COMMAND: Word(|v| v.command), "", "command: 1 stop, 18 run forward, 34 run reverse, 0 release";
     FREQUENCY: Number(100, |v| f32::from(v.frequency) * 0.01), "Hz", "frequency that is asked for";
@@ -121,7 +130,7 @@ pub static ROWS: [Row; 30] = rows! {
     0x2100: Word(|v| v.fault()), "", "number of the latched fault, 0 for none";
     0x2101: Word(|v| v.delta_status()), "", "status, see below";
     0x2102: Number(100, |v| f32::from(v.frequency) * 0.01), "Hz", "frequency that is asked for";
-    0x2103: Number(100, |v| v.output_hz()), "Hz", "output frequency (of the flux), magnitude";
+    0x2103: Number(100, |v| v.rpm().abs() * v.hz_per_rpm()), "Hz", "frequency of the shaft, without slip, magnitude: comparable with 0x2001";
     0x2104: Number(10, |v| v.current()), "A", "current of a line, rms of the fundamental";
     0x2105: Number(10, |v| v.dc_link()), "V", "dc link";
     0x2106: Number(10, |v| v.voltage()), "V", "output voltage between lines, rms of the fundamental";
@@ -130,6 +139,7 @@ pub static ROWS: [Row; 30] = rows! {
     0x210c: Number(1, |v| v.rpm().abs()), "rpm", "speed of the shaft, magnitude";
     0x210e: Number(1, |v| v.heat_sink()), "degC", "heat sink, signed";
     0x211b: Number(100, |v| v.largest_hz()), "Hz", "largest frequency that is asked for: `speed.limit_rpm` times pole pairs";
+    0x2120: Number(100, |v| v.output_hz()), "Hz", "output frequency (of the flux), with slip, magnitude";
     STAGED: Word(|v| v.desk.settings().count() as u16), "", "number of staged settings; 1 puts them in force, 2 also saves them, 3 drops them";
     0x5000: Word(|_| 1), "", "layout of the pages";
     0x5001: Double(|_| 0x669f_b378), "", "always 0x669FB378: the numbers of the settings' registers never change";
@@ -144,6 +154,9 @@ pub static ROWS: [Row; 30] = rows! {
     0x603f: Word(|v| v.error_code()), "", "fault as in CiA 402: 0xFF00 plus its number, 0 for none";
     CONTROL: Word(|v| v.control_word()), "", "control word of CiA 402, see below";
     0x6041: Word(|v| v.status_word()), "", "status word of CiA 402, see below";
+    0x605a: Word(|v| v.quick_stop()), "", "quick stop option code of CiA 402: `bus.quick_stop`";
+    MODE: Word(|_| VELOCITY), "", "mode of operation of CiA 402: 2, velocity; other values are refused with exception 3";
+    0x6061: Word(|v| v.mode()), "", "mode of operation in force: 1 position, 2 velocity, 4 torque, 0 another or none";
 };
 
 impl View<'_> {
@@ -266,29 +279,63 @@ impl View<'_> {
         self.status.map_or(0.0, |status| scales.ntc.celsius(status.sample.heat_sink))
     }
 
-    fn power(&self) -> Power {
-        Power::of(self.status.map(|status| status.state), self.settings)
+    fn quick_stop(&self) -> u16 {
+        // Its words are numbers.
+        self.settings.modules.bus.quick_stop.word().parse().unwrap_or(0)
+    }
+
+    fn mode(&self) -> u16 {
+        match self.status.map(|status| status.state) {
+            Some(State::Position) => 1,
+            Some(State::Speed | State::VoltsPerHertz) => VELOCITY,
+            Some(State::Torque) => 4,
+            _ => 0,
+        }
     }
 
     fn delta_status(&self) -> u16 {
-        let state = match self.power() {
-            Power::OperationEnabled => STATE_RUNS,
-            Power::SwitchedOn => STATE_STARTS,
-            Power::QuickStopActive => STATE_STOPS,
+        let state = match self.status.map(|status| status.state.stage()) {
+            Some(Stage::Running) => STATE_RUNS,
+            Some(Stage::Starting) => STATE_STARTS,
+            Some(Stage::Stopping) => STATE_STOPS,
             _ => 0,
         };
         let reverse = if self.rpm() < -0.5 { TURNS_REVERSE } else { 0 };
         let by_bus = if self.settings.command.commander == Commander::Bus { BY_BUS } else { 0 };
         let assumed = if self.speed_is_assumed() { SPEED_ASSUMED } else { 0 };
-        state | reverse | by_bus | assumed
+        let at_speed = if self.at_speed { AT_SPEED } else { 0 };
+        let standstill = if self.standstill { STANDSTILL } else { 0 };
+        state | reverse | by_bus | at_speed | standstill | assumed
     }
 
+    /// The control word that leads to the state.
     fn control_word(&self) -> u16 {
-        if self.command & RUN == RUN { cia402::RUN } else { cia402::SHUTDOWN }
+        match self.power {
+            _ if self.command & RUN == RUN => 15,
+            Power::SwitchedOn => 7,
+            Power::ReadyToSwitchOn => 6,
+            _ => 0,
+        }
+    }
+
+    /// Whether the drive regulates the speed and has reached its reference.
+    pub fn is_at_reference(&self) -> bool {
+        let most = self.settings.drive.speed_limit_rpm();
+        let wanted = f32::from(self.frequency) * 0.01 / self.hz_per_rpm();
+        let error = self.rpm().abs() - wanted.min(most);
+        let near = error.abs() <= 0.01 * self.settings.modules.bus.reached_pct * most;
+        near && self.status.is_some_and(|status| status.state == State::Speed)
+    }
+
+    /// Whether the shaft is known to be at rest.
+    pub fn is_at_standstill(&self) -> bool {
+        let slow = 0.01 * self.settings.modules.bus.standstill_pct;
+        let at_rest = self.rpm().abs() <= slow * self.settings.drive.speed_limit_rpm();
+        at_rest && self.status.is_some() && !self.speed_is_assumed()
     }
 
     fn status_word(&self) -> u16 {
-        let mut word = self.power().bits();
+        let mut word = self.power.bits();
         if self.status.is_some() && self.dc_link() > self.settings.drive.dc_under_v() {
             word |= cia402::VOLTAGE_ENABLED;
         }
@@ -298,11 +345,11 @@ impl View<'_> {
         if self.speed_is_assumed() {
             word |= cia402::SPEED_ASSUMED;
         }
-        let wanted = f32::from(self.frequency) * 0.01 / self.hz_per_rpm();
-        let error = self.rpm().abs() - wanted.min(self.settings.drive.speed_limit_rpm());
-        let near = error.abs() <= REACHED * self.settings.drive.speed_limit_rpm();
-        if near && self.status.is_some_and(|status| status.state == State::Speed) {
+        if self.at_speed {
             word |= cia402::TARGET_REACHED;
+        }
+        if self.standstill {
+            word |= cia402::STANDSTILL;
         }
         word
     }
@@ -321,7 +368,7 @@ impl Row {
 
     /// Whether the row can be written.
     pub fn is_written(&self) -> bool {
-        matches!(self.at, COMMAND | FREQUENCY | RESET | STAGED | CONTROL)
+        matches!(self.at, COMMAND | FREQUENCY | RESET | STAGED | CONTROL | MODE)
     }
 
     /// Number of registers of the row.

@@ -1,5 +1,6 @@
 //! The settings of the field bus, and the USART's values for rate and format.
 
+use drive_core::Stop;
 use drive_settings::value::Words;
 use drive_settings::words;
 
@@ -76,12 +77,64 @@ words! {
     }
 }
 
+words! {
+    /// The stop by the command register.
+    #[derive(Default)]
+    pub enum StopBy {
+        /// The speed falls by `speed.ramp_rpm_per_s`, as masters expect that wait for standstill.
+        #[default]
+        Ramp = "ramp",
+        /// The outputs go off, and the shaft coasts.
+        Coast = "coast",
+    }
+}
+
+words! {
+    /// Quick stop option code of CiA 402 (object 0x605A).
+    #[derive(Default)]
+    pub enum QuickStop {
+        /// The outputs go off, and the shaft coasts.
+        Off = "0",
+        /// By `speed.ramp_rpm_per_s`.
+        Ramp = "1",
+        /// By `speed.quick_rpm_per_s`.
+        #[default]
+        Quick = "2",
+        /// As 1, and the state stays *quick stop active*.
+        RampStays = "5",
+        /// As 2, and the state stays *quick stop active*.
+        QuickStays = "6",
+    }
+}
+
+impl QuickStop {
+    /// The stop of the drive.
+    pub fn stop(self) -> Stop {
+        match self {
+            Self::Off => Stop::Now,
+            Self::Ramp | Self::RampStays => Stop::Ramp,
+            Self::Quick | Self::QuickStays => Stop::Quick,
+        }
+    }
+
+    /// Whether the state stays *quick stop active* at standstill.
+    pub fn stays(self) -> bool {
+        matches!(self, Self::RampStays | Self::QuickStays)
+    }
+}
+
 // Rate and parity are those that the specification recommends (Modbus over serial line V1.02, 2.4.2).
 settings! { [modules.bus]
     105: whole(), "bus.address", address: u32 = 1, "address of the drive on the bus".from_to(1.0, 247.0);
     106: word("bit/s"), "bus.baud", baud: Baud = Baud::B19200, "rate of the bus";
     107: word(), "bus.parity", format: Format = Format::Even, "data bits, parity and stop bits of the bus";
     131: word(), "bus.alive", alive: Alive = Alive::Writes, "requests that keep the master alive: commands, or any valid one".guarded(Guard::Lower);
+    136: word(), "bus.stop", stop: StopBy = StopBy::Ramp, "stop by 1 in the command register: by the ramp of the speed, or the shaft coasts";
+    137: word(), "bus.quick_stop", quick_stop: QuickStop = QuickStop::Quick, "quick stop of CiA 402: 0 coast, 1 ramp, 2 quick ramp; 5, 6 as 1, 2, and its state stays";
+    138: number("s"), "bus.delay_s", delay_s: f32 = 0.0, "time before a request is carried out and answered, for masters that switch their driver off late".from_to(0.0, 0.02);
+    139: number("%"), "bus.reached_pct", reached_pct: f32 = 1.0, "deviation of the speed that counts as reached, of `speed.limit_rpm`".from_to(0.1, 20.0);
+    140: number("%"), "bus.standstill_pct", standstill_pct: f32 = 0.5, "speed that counts as standstill, of `speed.limit_rpm`".from_to(0.05, 5.0);
+    141: number("s"), "bus.steady_s", steady_s: f32 = 0.1, "time for which the speed must be reached, or the shaft at standstill, until it is told".from_to(0.0, 10.0);
 }
 
 impl Settings {

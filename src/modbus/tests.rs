@@ -122,6 +122,9 @@ fn a_busy_slave_answers_whole_requests_for_it_alone() {
         let several = [17, 16, a, b, 0, 1, 2, c, d];
         let acknowledged = Some(framed(&several[..6]));
         assert_eq!(busy(&framed(&several)), (exception(16).or(acknowledged), stop), "{at:#x}");
+        // The answer to function 23 would need the registers.
+        let both = framed(&[17, 23, 0x21, 0, 0, 1, a, b, 0, 1, 2, c, d]);
+        assert_eq!(busy(&both), (Some(framed(&[17, 0x97, 6])), stop), "{at:#x}");
         assert_eq!(busy(&framed(&[0, 6, a, b, c, d])), (None, stop), "{at:#x}");
         assert_eq!(busy(&framed(&[18, 6, a, b, c, d])), (None, None), "{at:#x}");
     }
@@ -135,6 +138,9 @@ fn frames_of_the_specification() {
         (&[17, 6, 0x20, 0x02, 0xab, 0xcd], &[17, 6, 0x20, 0x02, 0xab, 0xcd]),
         (&[17, 16, 0x20, 0x01, 0, 2, 4, 0, 10, 1, 2], &[17, 16, 0x20, 0x01, 0, 2]),
         (&[17, 8, 0, 0, 0xa5, 0x37], &[17, 8, 0, 0, 0xa5, 0x37]),
+        // 6.4 and 6.17: input registers are the same registers; the read sees what was written.
+        (&[17, 4, 0x20, 0x01, 0, 2], &[17, 4, 4, 0, 3, 0, 6]),
+        (&[17, 23, 0x20, 3, 0, 2, 0x20, 4, 0, 1, 2, 0xab, 0xcd], &[17, 23, 4, 0, 9, 0xab, 0xcd]),
         // Illegal function: coils, another subfunction, a user-defined function.
         (&[17, 1, 0x20, 0, 0, 1], &[17, 0x81, 1]),
         (&[17, 5, 0x20, 0, 1, 2], &[17, 0x85, 1]),
@@ -154,6 +160,11 @@ fn frames_of_the_specification() {
         (&[17, 16, 0x20, 0, 0, 1, 3, 0, 1, 2], &[17, 0x90, 3]),
         (&[17, 16, 0x20, 0, 0, 0, 0], &[17, 0x90, 3]),
         (&[17, 16, 0x20, 0, 0, 2, 4, 0, 1], &[17, 0x90, 3]),
+        (&[17, 4, 0x20, 0, 0, 0], &[17, 0x84, 3]),
+        (&[17, 23, 0x20, 0, 0, 0, 0x20, 0, 0, 1, 2, 0, 1], &[17, 0x97, 3]),
+        (&[17, 23, 0x20, 0, 0, 1, 0x20, 0, 0, 2, 2, 0, 1], &[17, 0x97, 3]),
+        (&[17, 23, 0x20, 0, 0, 1, 0x20, 0, 0], &[17, 0x97, 3]),
+        (&[17, 23, 0x30, 0, 0, 1, 0x20, 0, 0, 1, 2, 0, 1], &[17, 0x97, 2]),
         // The slave cannot carry it out.
         (&[17, 6, 0x20, 0xff, 0, 0], &[17, 0x86, 4]),
     ] {
@@ -213,12 +224,15 @@ fn random_and_mutated_frames() {
         let (at, count) = (rng.next_u32() as u8, rng.next_u32() as u8 % 130);
         let mut frame = match n % 4 {
             0 => bytes,
-            1 => framed(&[17, 3, 0x20, at, 0, count]),
+            1 => framed(&[17, 3 + at % 2, 0x20, at, 0, count]),
             2 => framed(&[17, 6, 0x20, at, count, at]),
             _ => {
                 let count = count % 4 + 1;
                 let values = vec![at; 2 * usize::from(count)];
-                framed(&[&[17, 16, 0x20, at, 0, count, 2 * count][..], &values].concat())
+                let write = [0x20, at, 0, count, 2 * count];
+                let function: &[u8] =
+                    if at % 2 == 0 { &[17, 16] } else { &[17, 23, 0x20, count, 0, 3] };
+                framed(&[function, &write, &values].concat())
             }
         };
         let mutate = rng.next_u32().is_multiple_of(2) && !frame.is_empty();
@@ -284,6 +298,59 @@ fn rows() -> String {
     text
 }
 
+/// The state machine as in Figure 2 and Table 4 of IEC 61800-7-201, read independently of the product's table: for each state, the state
+/// after each command of the control word, a fault, and its reset. `-` is no transition.
+#[test]
+fn control_words_lead_to_the_states_of_the_standard() {
+    use super::cia402::{Event, after};
+    let states = Power::ALL.map(|(power, ..)| power);
+    // Words of the commands, one of each set of bits that the standard gives: disable voltage, quick stop, shutdown, switch on (disable
+    // operation), enable operation.
+    let words = [
+        [0x00, 0x05, 0x0d],
+        [0x02, 0x03, 0x0b],
+        [0x06, 0x0e, 0x16],
+        [0x07, 0x17, 0x47],
+        [0x0f, 0x1f, 0x4f],
+    ];
+    let expected = [
+        "-----", // 0, not ready to switch on
+        "--2--", // 1, switch on disabled
+        "11-34", // 2, ready to switch on
+        "112-4", // 3, switched on
+        "1523-", // 4, operation enabled
+        "1---4", // 5, quick stop active
+        "-----", // 6, fault
+    ];
+    for (from, row) in states.iter().zip(expected) {
+        for (command, place) in words.iter().zip(row.chars()) {
+            for word in command {
+                let to = after(*from, Event::of(*word));
+                let wanted = place.to_digit(10).map_or(*from, |n| states[n as usize]);
+                assert_eq!(to, wanted, "{from:?} by {word:#x}");
+            }
+        }
+        let failed = after(*from, Event::Failed);
+        assert_eq!(failed, Power::Fault, "{from:?}");
+        let cleared = after(*from, Event::Cleared);
+        assert_eq!(cleared, if *from == Power::Fault { states[1] } else { *from }, "{from:?}");
+    }
+    assert_eq!(after(states[0], Event::Ready), states[1]);
+}
+
+/// The transitions of the manual.
+fn transitions() -> String {
+    let mut text = String::new();
+    for row in &super::cia402::TRANSITIONS {
+        let from: Vec<_> = row.from.iter().map(|power| power.name()).collect();
+        let causes: Vec<_> = row.on.iter().map(|event| event.name()).collect();
+        let from = if from.len() > 2 { "all others".to_owned() } else { from.join(", ") };
+        writeln!(text, "| {} | {from} | {} | {} |", row.number, causes.join(", "), row.to.name())
+            .unwrap();
+    }
+    text
+}
+
 fn states() -> String {
     let mut text = String::new();
     for (place, (power, name, bits)) in Power::ALL.into_iter().enumerate() {
@@ -301,6 +368,7 @@ fn the_manual_lists_the_registers() {
     };
     table("registers", "| address | size | unit | | meaning |", rows());
     table("states", "| state | bits |", states());
+    table("transitions", "| number | from | cause | to |", transitions());
     assert_eq!(FAULTS, 0x5100);
 }
 
@@ -339,7 +407,11 @@ fn the_manual_lists_the_refusals() {
         ),
         (Refusal::Hardware(key), "a setting of the hardware", "set it at the console"),
         (Refusal::Flash(FlashError::Erase(0)), "the flash was not written", "save again"),
-        (Refusal::Ended, "the drive has stopped for another reason", "write a stop, then the run"),
+        (
+            Refusal::Ended,
+            "a stop comes before a run: the drive has stopped for another reason, or the state of CiA 402 has no such transition",
+            "1 to `0x2000`, or 6 to `0x6040`",
+        ),
         (
             Refusal::Command(CommandError::NoAnswer),
             "the control does not run",

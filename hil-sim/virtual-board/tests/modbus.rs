@@ -25,6 +25,7 @@ const ANSWERED_FAST: u64 = 60;
 const LATEST_S: f64 = 0.004;
 const COMMAND: u16 = 0x2000;
 const STATUS: u16 = 0x2101;
+const AT_SPEED: u16 = 1 << 12;
 /// State "operation enabled", commanded by the bus.
 const RUNS: u16 = 0x503;
 const SERVER_FAILURE: u8 = 4;
@@ -135,8 +136,8 @@ const BUS: [&str; 2] = ["set bus.commands bus", "save"];
 #[test]
 fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     let mut master = Master::new(&BUS)?;
-    // Ready to switch on, quick stop not active, dc link present, remote; after a reset the speed is unknown.
-    assert_eq!(master.read(0x6041, 1)?, [0x4231]);
+    // Switch on disabled, dc link present, remote; after a reset the speed is unknown.
+    assert_eq!(master.read(0x6041, 1)?, [0x4250]);
     // `speed.limit_rpm` of the image, 0.01 Hz.
     let settings = induction_drive::board::settings();
     let largest = settings.speed_limit_rpm() * f32::from(settings.motor.pole_pairs) / 0.6;
@@ -149,7 +150,7 @@ fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     assert!((rpm / 150.0 - 1.0).abs() < 0.03, "{rpm} rpm");
     let page = master.read(0x2100, 13)?;
     println!("{rpm:.2} rpm at the rotor; 0x2100: {page:?}");
-    assert_eq!((page[0], page[1], page[2]), (0, RUNS, 500));
+    assert_eq!((page[0], page[1], page[2]), (0, RUNS | AT_SPEED, 500));
     // A single reading varies with the tracked angle.
     let mut frequency = 0.0;
     for _ in 0..8 {
@@ -169,15 +170,17 @@ fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     master.run(3.5)?;
     let rpm = master.rpm();
     assert!((rpm / -150.0 - 1.0).abs() < 0.03, "{rpm} rpm");
-    assert_eq!(master.read(STATUS, 1)?, [RUNS | 3 << 3]);
+    assert_eq!(master.read(STATUS, 1)?, [RUNS | 3 << 3 | AT_SPEED]);
     // Settings must not be written meanwhile.
     let set = [16, 0x40, 0, 0, 2, 4, 0x40, 0xb0, 0, 0];
     assert_eq!(master.ask(&set)?, [0x90, SERVER_FAILURE]);
     assert_eq!(master.write(COMMAND, 1)?, None);
-    master.run(1.0)?;
+    master.run(2.0)?;
     assert!(!master.outputs_on());
-    // Off; the last speed, in reverse, is assumed.
-    assert_eq!(master.read(STATUS, 1)?, [0x8518]);
+    // Off, and at standstill: by `bus.standstill_pct`, slower than 0.5 % of the largest speed.
+    assert_eq!(master.read(STATUS, 1)?, [0x2500]);
+    let slow = 0.005 * f64::from(settings.speed_limit_rpm());
+    assert!(master.rpm().abs() < slow, "{} rpm", master.rpm());
     assert!(master.board.resets.is_empty());
     Ok(())
 }

@@ -292,8 +292,8 @@ impl modbus::Port for FakeBus {
     fn set_line(&mut self, settings: &BusSettings) {
         self.line = Some((settings.baud, settings.format));
     }
-    fn receive(&mut self) -> Option<modbus::Frame> {
-        self.asked.pop_front()
+    fn receive(&mut self, is_due: impl FnOnce() -> bool) -> Option<modbus::Frame> {
+        if self.asked.is_empty() || !is_due() { None } else { self.asked.pop_front() }
     }
     fn send(&mut self, frame: &modbus::Frame) {
         self.answers.push_back(frame.clone());

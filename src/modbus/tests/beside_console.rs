@@ -35,11 +35,16 @@ impl Both {
         self.talk.bus.as_mut().unwrap()
     }
 
-    /// The answer to a request: without address and checksum.
-    pub fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
+    /// Puts a request on the line, without address and checksum.
+    fn request(&mut self, pdu: &[u8]) {
         let body = [&[1], pdu].concat();
         let sum = modbus_core::rtu::crc16(&body).to_be_bytes();
         self.port().asked.push_back(Frame::from_slice(&[&body[..], &sum].concat()).unwrap());
+    }
+
+    /// The answer to a request: both without address and checksum.
+    pub fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
+        self.request(pdu);
         self.serve();
         let answer = self.port().answers.pop_front().expect("an answer");
         answer[1..answer.len() - 2].to_vec()
@@ -73,14 +78,30 @@ fn requests_during_a_design_are_not_answered() {
     let mut both = Both::by_bus();
     both.set("motor.r_s", 5.3);
     both.write(0x2000, 18);
-    let sum = modbus_core::rtu::crc16(&[1, 8, 0, 0, 1, 2]).to_be_bytes();
-    both.port()
-        .asked
-        .push_back(Frame::from_slice(&[&[1, 8, 0, 0, 1, 2], &sum[..]].concat()).unwrap());
+    both.request(&[8, 0, 0, 1, 2]);
     let Talk { front, drive, .. } = &mut both.talk;
     front.desk.run_pending(drive, 0);
     both.serve();
     assert!(both.port().asked.is_empty() && both.port().answers.is_empty());
+}
+
+/// With a delay of 5 ms a request is carried out and answered 5 ms after it came, and the next one 5 ms after it came.
+#[test]
+fn an_answer_waits_for_the_delay() {
+    let mut both = Both::by_bus();
+    both.talk.say("set bus.delay_s 0.005\napply\n");
+    for request in [[6, 0x20, 1, 0, 18], [6, 0x20, 0, 0, 18]] {
+        both.request(&request);
+        for late in 0..6_u32 {
+            both.serve();
+            let answers: Vec<_> = both.port().answers.drain(..).collect();
+            assert_eq!(answers.len(), usize::from(late == 5), "after {late} ms");
+            both.talk.now_ms += 1;
+        }
+        both.talk.now_ms += 100;
+        both.serve();
+    }
+    assert!(!both.talk.drive.commands.is_empty());
 }
 
 /// Every hardware setting is refused, even with its present value, in the range or not; the console tells the reason once.
@@ -116,9 +137,7 @@ proptest! {
     fn any_frames_leave_a_bus_that_answers(frames: Vec<(u8, Vec<u8>)>, by_bus: bool) {
         let mut both = if by_bus { Both::by_bus() } else { Both::new("") };
         for (function, rest) in frames {
-            let body = [&[1, function % 20], &rest[..rest.len().min(250)]].concat();
-            let sum = modbus_core::rtu::crc16(&body).to_be_bytes();
-            both.port().asked.push_back(Frame::from_slice(&[&body[..], &sum].concat()).unwrap());
+            both.request(&[&[function % 24], &rest[..rest.len().min(250)]].concat());
             both.serve();
         }
         both.port().answers.clear();
