@@ -8,7 +8,6 @@
 pub mod handle;
 pub mod news;
 pub mod order;
-pub mod power;
 pub mod shaft;
 mod stage_faults;
 #[cfg(test)]

@@ -11,8 +11,6 @@ use crate::cli_common::folder;
 use drive_core::{Fault, State};
 use hil_sim::console::catalogue::Catalogue;
 use hil_sim::console::link::{Link, LinkError, is_off};
-use induction_drive::desk::power::Power;
-use induction_drive::settings::FirmwareSettings;
 use serialport::{SerialPort as _, TTYPort};
 
 /// A firmware with two settings.
@@ -218,8 +216,7 @@ fn the_outputs_are_off_in_the_states_in_which_they_are() {
         [State::Calibrating, State::Torque, State::Learning, State::Braking, State::Stopping];
     let faults = Fault::ALL.iter().map(|fault| State::Fault(*fault));
     for state in running.into_iter().chain([State::Off]).chain(faults) {
-        let power = Power::of(Some(state), &FirmwareSettings::of_the_board()).name();
-        assert_eq!(is_off(&format!("{state}; {power}; i_d 0.00 A")), state.is_off(), "{state}");
+        assert_eq!(is_off(&format!("{state}; i_d 0.00 A")), state.is_off(), "{state}");
     }
     assert!(!is_off("error: the control interrupt does not run") && !is_off("off"));
 }

@@ -13,7 +13,6 @@ use super::Console;
 use super::handle::Firmware;
 use crate::board::CYCLES_PER_US;
 use crate::desk::Desk;
-use crate::desk::power::Power;
 use crate::desk::shaft::Shaft;
 use crate::link::Status;
 use crate::settings::FirmwareSettings;
@@ -59,10 +58,9 @@ fn line(
     (used, size): (usize, usize),
 ) -> fmt::Result {
     let rpm = shaft.rpm(settings);
-    let power = Power::of(Some(s.state), settings).name();
     let settings = &settings.drive;
     let (t, motor, scales) = (&s.telemetry, &settings.motor, &settings.scales);
-    write!(f, "{}; {power}; ", s.state)?;
+    write!(f, "{}; ", s.state)?;
     if s.hardware.contains(Hardware::BREAK) {
         write!(f, "fault input trips; ")?;
     }

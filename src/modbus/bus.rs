@@ -7,7 +7,7 @@ use drive_core::{Mode, Stage, State, Stop};
 use modbus_core::Exception;
 
 use super::Port;
-use super::cia402::{self, Event};
+use super::cia402::{self, Event, Power};
 use super::faults::FaultLog;
 use super::float::from_float;
 use super::registers::{
@@ -18,7 +18,6 @@ use super::slave::{self, Registers, Words, Written};
 use crate::desk::Desk;
 use crate::desk::handle::DriveHandle;
 use crate::desk::order::{Order, Refusal};
-use crate::desk::power::Power;
 use crate::settings::Commander;
 use crate::settings::keys;
 use crate::settings::staging::{Assignments, MOST, SetError};

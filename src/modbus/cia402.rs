@@ -1,6 +1,5 @@
 //! The state machine of CiA 402 (IEC 61800-7-201): the effect of a control word in each state. It knows neither a bus nor the drive.
 
-use crate::desk::power::Power;
 use Event::{
     Cleared, DisableVoltage, EnableOperation, Failed, QuickStop, Ready, Shutdown, Stopped, SwitchOn,
 };
@@ -22,6 +21,49 @@ pub const TARGET_REACHED: u16 = 1 << 10;
 pub const STANDSTILL: u16 = 1 << 12;
 /// Bit of the status word, manufacturer-specific: the drive is off, and the speed is the last measured one.
 pub const SPEED_ASSUMED: u16 = 1 << 14;
+
+/// A state of the CiA 402 state machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Power {
+    /// The control does not run.
+    #[default]
+    NotReadyToSwitchOn,
+    /// Off; a start needs *shutdown* first, and the bus must command.
+    SwitchOnDisabled,
+    /// Off; *switch on* or *enable operation* goes on.
+    ReadyToSwitchOn,
+    /// Off; *enable operation* starts the drive. Also while the start is under way.
+    SwitchedOn,
+    /// The drive regulates, learns or measures.
+    OperationEnabled,
+    /// The drive stops, or has stopped and stays in this state.
+    QuickStopActive,
+    /// Off with a latched fault.
+    Fault,
+}
+
+impl Power {
+    /// All states, in the order of the state machine, each with its name in the standard and bits 0 to 3, 5 and 6 of the status word.
+    pub const ALL: [(Self, &str, u16); 7] = [
+        (Self::NotReadyToSwitchOn, "not ready to switch on", 0x00),
+        (Self::SwitchOnDisabled, "switch on disabled", 0x40),
+        (Self::ReadyToSwitchOn, "ready to switch on", 0x21),
+        (Self::SwitchedOn, "switched on", 0x23),
+        (Self::OperationEnabled, "operation enabled", 0x27),
+        (Self::QuickStopActive, "quick stop active", 0x07),
+        (Self::Fault, "fault", 0x08),
+    ];
+
+    /// Name in the standard.
+    pub const fn name(self) -> &'static str {
+        Self::ALL[self as usize].1
+    }
+
+    /// Bits 0 to 3, 5 and 6 of the status word.
+    pub const fn bits(self) -> u16 {
+        Self::ALL[self as usize].2
+    }
+}
 
 /// Cause of a transition: a command of the control word, or something that happens to the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,21 +89,6 @@ pub enum Event {
 }
 
 impl Event {
-    /// Its name, for commands that of the standard.
-    pub const fn name(self) -> &'static str {
-        match self {
-            DisableVoltage => "disable voltage",
-            QuickStop => "quick stop",
-            Shutdown => "shutdown",
-            SwitchOn => "switch on, disable operation",
-            EnableOperation => "enable operation",
-            Ready => "the control runs",
-            Stopped => "the drive has stopped without a command of the bus",
-            Failed => "fault",
-            Cleared => "the fault is cleared",
-        }
-    }
-
     /// The command of a control word, by its bits 0 to 3.
     pub const fn of(control_word: u16) -> Self {
         match control_word & 0b1111 {

@@ -7,12 +7,11 @@ use drive_core::{Stage, State};
 use drive_settings::value::Words as _;
 use modbus_core::Exception;
 
-use super::cia402;
+use super::cia402::{self, Power};
 use super::faults::{self, FaultLog};
 use super::float::to_float;
 use crate::desk::Desk;
 use crate::desk::order::Refusal;
-use crate::desk::power::Power;
 use crate::link::Status;
 use crate::recording::trace::{SIGNALS as ALL_SIGNALS, Sampled, shown};
 use crate::settings::Commander;

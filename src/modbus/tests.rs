@@ -12,13 +12,13 @@ use drive_settings::SettingsError;
 
 use super::Frame;
 use super::bus::is_stop;
+use super::cia402::Power;
 use super::registers::{FAULTS, ROWS, Shown};
 use super::settings::{Baud, Format};
 use super::slave::{self, Registers, Words};
 use crate::board::CLOCK_HZ;
 use crate::desk::handle::CommandError;
 use crate::desk::order::Refusal;
-use crate::desk::power::Power;
 use crate::generated;
 use crate::settings::Commander;
 use crate::settings::keys;
@@ -340,10 +340,22 @@ fn control_words_lead_to_the_states_of_the_standard() {
 
 /// The transitions of the manual.
 fn transitions() -> String {
+    use super::cia402::Event;
+    let cause = |event: &Event| match event {
+        Event::DisableVoltage => "disable voltage",
+        Event::QuickStop => "quick stop",
+        Event::Shutdown => "shutdown",
+        Event::SwitchOn => "switch on, disable operation",
+        Event::EnableOperation => "enable operation",
+        Event::Ready => "the control runs",
+        Event::Stopped => "the drive has stopped without a command of the bus",
+        Event::Failed => "fault",
+        Event::Cleared => "the fault is cleared",
+    };
     let mut text = String::new();
     for row in &super::cia402::TRANSITIONS {
         let from: Vec<_> = row.from.iter().map(|power| power.name()).collect();
-        let causes: Vec<_> = row.on.iter().map(|event| event.name()).collect();
+        let causes: Vec<_> = row.on.iter().map(cause).collect();
         let from = if from.len() > 2 { "all others".to_owned() } else { from.join(", ") };
         writeln!(text, "| {} | {from} | {} | {} |", row.number, causes.join(", "), row.to.name())
             .unwrap();

@@ -6,9 +6,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use drive_core::State;
 use drive_stream::Frame;
 use drive_stream::client::{Answer, Client, Event};
-use induction_drive::desk::power::Power;
 
 use super::trace::Trace;
 
@@ -31,11 +31,10 @@ pub enum LinkError {
     Cut(String),
 }
 
-/// Whether the outputs are off, by the state under its name in CiA 402 in the line of `status`.
+/// Whether the outputs are off, by the state with which the line of `status` begins.
 pub fn is_off(status: &str) -> bool {
-    let name = status.split("; ").nth(1);
-    let off = [Power::SwitchOnDisabled, Power::ReadyToSwitchOn, Power::Fault];
-    off.into_iter().any(|power| name == Some(power.name()))
+    let state = status.split_once("; ").map(|(state, _)| state);
+    state.is_some_and(|state| state == State::Off.to_string() || state.starts_with("in fault "))
 }
 
 /// Destinations of the drive's lines and frames.
