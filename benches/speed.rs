@@ -23,7 +23,7 @@ fn rig(changes: &[&str]) -> Rig {
 
 fn speed(c: &mut Criterion) {
     let variants: [(&str, &[&str]); 2] =
-        [("sensorless", &[]), ("encoder", &["angle.source=encoder"])];
+        [("sensorless", &[]), ("encoder", &["angle_source=encoder"])];
     for (name, changes) in variants {
         // A second of recorded samples, replayed from the state in which the recording began.
         let mut recorder = rig(changes);
