@@ -16,6 +16,11 @@ const LONGEST_LEARNING_S: u32 = 1000;
 /// Time at rest after a saliency self-commissioning, in rotor time constants.
 const REST_T: f64 = 8.0;
 
+/// Longest start, s.
+const LONGEST_START_S: f64 = 30.0;
+/// Number of periods between two recorded points: 5 ms.
+const TRACE_EVERY: u64 = 30;
+
 /// Control periods per second.
 pub const RATE_HZ: f64 = 6000.0;
 
@@ -29,6 +34,12 @@ pub struct Rig {
     /// State of the firmware's interface around the drive.
     pub front_end: FrontEndState,
     periods: u64,
+    /// Largest phase current at the end of a period so far, A.
+    pub peak_a: f64,
+    /// Lowest and highest voltage of the dc link so far, V.
+    pub dc_link_v: (f64, f64),
+    /// A point every 5 ms, if they are requested.
+    pub trace: Option<Vec<Point>>,
     /// Duration of the last saliency self-commissioning, s, to a second.
     pub learning_s: f64,
 }
@@ -66,6 +77,12 @@ pub struct Point {
     pub speed_estimate_rpm: f64,
     /// Torque per flux and q-axis current, 3/2 P L_m/L_r.
     pub torque_per_flux_ampere: f64,
+    /// True angle of the rotor flux, electrical rad from phase a.
+    pub phi: f64,
+    /// Voltage of the dc link, V.
+    pub dc_link: f64,
+    /// Whether the drive regulates after this sample; otherwise it has no angle.
+    pub regulates: bool,
     /// Position of the rotor, mechanical turns.
     pub turns: f64,
     /// Estimated position, mechanical turns from the start of the drive.
@@ -91,8 +108,18 @@ impl Rig {
 
     /// Connects a drive that is off to a motor at rest, both made by the caller.
     pub fn of(plant: Plant, drive: Drive) -> Self {
-        let front_end = FrontEndState::default();
-        Self { plant, drive, front_end, periods: 0, learning_s: 0.0 }
+        let (front_end, v) = (FrontEndState::default(), plant.dc_link());
+        let (peak_a, dc_link_v) = (0.0, (v, v));
+        Self {
+            plant,
+            drive,
+            front_end,
+            periods: 0,
+            peak_a,
+            dc_link_v,
+            trace: None,
+            learning_s: 0.0,
+        }
     }
 
     /// Makes the bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency first
@@ -178,6 +205,14 @@ impl Rig {
 
     /// Runs one PWM period.
     pub fn step(&mut self) {
+        if self.trace.is_some() {
+            self.point();
+        } else {
+            self.period();
+        }
+    }
+
+    fn period(&mut self) {
         let sample = self.plant.sample();
         self.step_with(&sample);
     }
@@ -189,6 +224,9 @@ impl Rig {
         let (compare, output) = self.drive.period(&mut self.front_end, sample, &mut |_| {});
         self.plant.period(&compare, &output);
         self.periods += 1;
+        self.peak_a = self.plant.phase_currents().iter().fold(self.peak_a, |a, i| a.max(i.abs()));
+        let ((least, most), v) = (self.dc_link_v, self.plant.dc_link());
+        self.dc_link_v = (least.min(v), most.max(v));
     }
 
     /// Runs for `seconds`. The true state of the plant, which no caller needs here, is not computed.
@@ -196,6 +234,28 @@ impl Rig {
         for _ in 0..(seconds * RATE_HZ).round() as u64 {
             self.step();
         }
+    }
+
+    /// Runs until the drive is in a state that `is_reached` accepts, for one period or more and at most for `seconds`; returns
+    /// the state.
+    pub fn wait_until(&mut self, seconds: f64, is_reached: impl Fn(State) -> bool) -> State {
+        for _ in 0..(seconds * RATE_HZ).round() as u64 {
+            self.step();
+            if is_reached(self.drive.state()) {
+                break;
+            }
+        }
+        self.drive.state()
+    }
+
+    /// Gives the command to start in `mode`, and runs until the drive regulates or is off; returns its state.
+    ///
+    /// # Errors
+    /// If the drive refuses the command.
+    pub fn begin(&mut self, mode: Mode) -> Result<State, Error> {
+        self.command(&Command::Start(mode))?;
+        let has_begun = |state: State| state == State::of_mode(mode) || state.is_off();
+        Ok(self.wait_until(LONGEST_START_S, has_begun))
     }
 
     /// Runs for `seconds` and passes the point of every sample to `look`.
@@ -207,9 +267,12 @@ impl Rig {
 
     /// Runs one PWM period and returns the true state at the instant of its sample, with the drive's estimates from that sample.
     #[inline(never)] // compiled once, not with every closure that looks at points
-    fn point(&mut self) -> Point {
+    pub fn point(&mut self) -> Point {
         let (plant, phi) = (&self.plant, self.plant.rotor_flux_angle());
+        let is_traced = self.periods.is_multiple_of(TRACE_EVERY);
         let mut point = Point {
+            phi,
+            dc_link: plant.dc_link(),
             t: self.time(),
             torque: plant.torque(),
             torque_per_flux_ampere: plant.torque_factor(),
@@ -219,7 +282,8 @@ impl Rig {
             turns: plant.mechanical_angle() / TAU,
             ..Point::default()
         };
-        self.step();
+        self.period();
+        point.regulates = self.drive.state().regulates();
         let telemetry = self.drive.telemetry();
         let rpm = |step: f32| f64::from(step) * RATE_HZ * 60.0 / self.plant.pole_pairs();
         point.iq_ref = telemetry.reference.q.into();
@@ -232,6 +296,9 @@ impl Rig {
         point.speed_estimate_rpm = rpm(telemetry.rotor_freq);
         point.turns_estimate = telemetry.turns.into();
         point.angle_error_deg = wrapped_degrees(phi - f64::from(telemetry.phi.to_turns()) * TAU);
+        if let Some(trace) = self.trace.as_mut().filter(|_| is_traced) {
+            trace.push(point);
+        }
         point
     }
 
@@ -251,16 +318,10 @@ impl Rig {
     /// # Errors
     /// If the drive refuses the command, or does not regulate within 30 s.
     pub fn start(&mut self, mode: Mode) -> Result<(), Error> {
-        self.command(&Command::Start(mode))?;
-        for _ in 0..(30.0 * RATE_HZ) as u32 {
-            self.step();
-            match self.drive.state() {
-                State::Fault(_) => break,
-                state if state == State::of_mode(mode) => return Ok(()),
-                _ => {}
-            }
+        match self.begin(mode)? {
+            state if state == State::of_mode(mode) => Ok(()),
+            other => Err(Error::Refused(format!("the drive does not start: it is {other}"))),
         }
-        Err(Error::Refused(format!("the drive does not start: it is {}", self.drive.state())))
     }
 
     /// Gives the drive a command; returns whether the drive accepted it as given or limited it.

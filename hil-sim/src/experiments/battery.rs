@@ -15,7 +15,7 @@ mod trial;
 
 use std::sync::OnceLock;
 
-pub use bench::{Bench, LONGEST_START_S, Moment};
+pub use bench::Bench;
 pub use kind::{KINDS, Kind, allowed_a, nominal_limit_a, torque_limit_a, torque_nm};
 pub use run::{learned, trial};
 pub use summary::Summary;

@@ -11,7 +11,7 @@ impl Ramp {
     }
 }
 
-/// Change in a part, beside the reference and the load.
+/// Change or event in a part, beside the reference and the load.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Change {
     /// Nothing.
@@ -27,6 +27,16 @@ pub enum Change {
     DcLink(Ramp),
     /// The resistances of stator and rotor rise by these shares.
     Warming(f64, f64),
+    /// The drive starts at rest, and a dynamometer brings a held shaft up to its speed without torque.
+    Start,
+    /// The drive starts on a shaft that a dynamometer turns at this speed, rpm, and searches for the flux.
+    FlyingStart(f64),
+    /// The drive is stopped, and its outputs stay off for this time, s.
+    Coast(f64),
+    /// The drive brakes a free shaft to rest.
+    Brake,
+    /// The angle error counts after this time, s.
+    Count(f64),
 }
 
 /// A part of a run. Currents and speeds are for the dissertation's motor; on others they are in proportion, q-axis

@@ -12,9 +12,8 @@ mod trial;
 use std::sync::OnceLock;
 
 use case::Case;
-use trial::Run;
 
-use super::battery::{Learnt, Moment, Trial, learned, once};
+use super::battery::{Learnt, Trial, learned, once};
 use super::commission::commissioned;
 use crate::config::{FluxLevel, RangeKind};
 use crate::prelude::*;
@@ -103,7 +102,7 @@ impl FullRange {
     }
 
     /// Does a run; with `traced` it also records the curves.
-    fn done(&self, number: usize, traced: bool) -> Result<(Trial, Vec<Moment>), Error> {
+    fn done(&self, number: usize, traced: bool) -> Result<(Trial, Vec<Point>), Error> {
         let (case, seed) = (self.case(number), seed_of(self.seed, number));
         let mut config = self.config.clone();
         trial::set_up(case, &mut config);
@@ -115,7 +114,7 @@ impl FullRange {
         if case.kind == RangeKind::WrongParameters {
             bench = self.changed(number, &bench);
         }
-        Run::new(case, &bench, drive, seed)?.run(traced)
+        trial::trial(case, &bench, drive, seed, traced)
     }
 }
 

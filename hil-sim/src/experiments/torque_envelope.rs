@@ -53,7 +53,7 @@ fn measure(config: &Config, drive: &Drive, point: Point, seed: u64) -> Result<Me
     bench.command_torque(point.sign * config.amperes(BEYOND_A))?;
     bench.count_after(SETTLING_S);
     bench.watch(SETTLING_S + MEAN_S);
-    Ok((!bench.has_ended).then(|| (point.sign * bench.torque.mean(), bench.trial.peak_a)))
+    Ok((!bench.has_ended).then(|| (point.sign * bench.torque.mean(), bench.rig.peak_a)))
 }
 
 fn outcome(config: &Config, limit: &TorqueLimit, measured: &[(Point, Measured)]) -> Outcome {

@@ -3,7 +3,6 @@
 use super::kind::{nominal_limit_a, share_of_limit, torque_nm};
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
 use crate::experiments::course::{Change, Part, Shaft};
-use crate::plant::{Complex, Plant};
 use crate::prelude::*;
 
 /// Error beyond which the angle is wrong, degrees, unless the run sets another limit.
@@ -13,14 +12,20 @@ const FLUX_OFF: (f64, f64) = (0.5, 2.0);
 /// Longest interruption over which a state is regarded as continuing, s: an angle that runs through is right now and then.
 const GAP_S: f64 = 0.1;
 
-/// Longest start, s.
-pub const LONGEST_START_S: f64 = 30.0;
+/// Error within which a flying start has found the flux, degrees, the longest time for it, s, and the time between two looks, s.
+const CAUGHT_DEG: f64 = 15.0;
+const LONGEST_CATCH_S: f64 = 3.0;
+const LOOK_S: f64 = 1.0 / 600.0;
+/// Longest stop without torque, and longest stop by braking, s.
+const LONGEST_COAST_S: f64 = 30.0;
+const LONGEST_STOP_S: f64 = 60.0;
+/// Speed below which the shaft counts as stopped, rpm on four poles, and the time between two looks, s.
+const STOPPED_RPM: f64 = 30.0;
+const BRAKED_S: f64 = 0.02;
 /// Step time and acceleration of the dynamometer that brings a shaft up to speed, s and rpm/s, and the time after it, s.
 const PACE_S: f64 = 0.01;
 const RAMP_RPM_PER_S: f64 = 600.0;
 const AT_SPEED_S: f64 = 0.3;
-/// Number of periods between two recorded moments: 5 ms.
-const TRACE_EVERY: u64 = 30;
 
 /// Longest duration of a state.
 #[derive(Default)]
@@ -41,25 +46,6 @@ impl Lasting {
     }
 }
 
-/// A recorded moment of a run.
-#[derive(Clone, Copy, Debug)]
-pub struct Moment {
-    /// Time, s.
-    pub t: f64,
-    /// Angle error while the drive regulates, degrees.
-    pub error_deg: f64,
-    /// Speed of the shaft, rpm.
-    pub rpm: f64,
-    /// Torque of the motor, Nm.
-    pub torque: f64,
-    /// Magnitude of the stator current, A peak.
-    pub current: f64,
-    /// Rotor flux of the motor from phase a, Wb peak.
-    pub flux: Complex,
-    /// The dc link, V.
-    pub dc_link: f64,
-}
-
 /// A drive and a plant, with the quantities that are observed.
 pub struct Bench<'a> {
     /// Drive and plant.
@@ -67,8 +53,6 @@ pub struct Bench<'a> {
     /// Configuration of the plant, which scales currents, speeds and torques.
     pub config: &'a Config,
     shaft: Shaft,
-    /// Quantity that the drive regulates.
-    mode: Mode,
     /// Flux of the magnetising current, Wb.
     nominal_flux: f64,
     /// Time from which the error is counted, s; unset before the first reference, and after the flux was rotated.
@@ -83,8 +67,6 @@ pub struct Bench<'a> {
     pub error_deg: f64,
     /// Error beyond which the angle is wrong, degrees.
     pub wrong_deg: f64,
-    /// The curves of the run, if requested.
-    pub trace: Option<Vec<Moment>>,
     counts: Vec<u32>,
     /// Durations for which the angle is wrong and lost, and the flux off.
     lasting: [Lasting; 3],
@@ -104,28 +86,24 @@ impl<'a> Bench<'a> {
     /// If the plant is refused.
     pub fn new(config: &'a Config, drive: &Drive, shaft: Shaft, seed: u64) -> Result<Self, Error> {
         let mut settings = plant_settings(config);
-        let (load, mode) = match shaft {
-            Shaft::Locked => (Load::Locked, Mode::Torque),
-            Shaft::Held(_) => (Load::Speed { speed: 0.0 }, Mode::Torque),
-            Shaft::Free => (Load::Free { torque: 0.0 }, Mode::Speed),
+        settings.mechanics.load = match shaft {
+            Shaft::Locked => Load::Locked,
+            Shaft::Held(_) => Load::Speed { speed: 0.0 },
+            Shaft::Free => Load::Free { torque: 0.0 },
         };
-        settings.mechanics.load = load;
         let mut plant = Plant::new(&settings, seed).map_err(Error::refused)?;
         plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;
-        let dc_link_v = (settings.inverter.vdc, settings.inverter.vdc);
         Ok(Self {
             rig: Rig::of(plant, drive.clone()),
             config,
             shaft,
-            mode,
             nominal_flux: settings.machine.lm * f64::from(config.drive.i_d()),
             counted_from: None,
             torque: Stats::default(),
-            trial: Trial { seed, dc_link_v, ..Trial::default() },
+            trial: Trial { seed, ..Trial::default() },
             taken: 0.0,
             error_deg: 0.0,
             wrong_deg: WRONG_DEG,
-            trace: None,
             counts: vec![0; LARGEST_CLASS + 1],
             lasting: Default::default(),
             was_off: false,
@@ -141,74 +119,28 @@ impl<'a> Bench<'a> {
     /// If the plant is refused.
     pub fn held(config: &'a Config, drive: &Drive, rpm: f64, seed: u64) -> Result<Self, Error> {
         let mut bench = Self::new(config, drive, Shaft::Held(rpm), seed)?;
-        bench.start();
         bench.bring_up()?;
         Ok(bench)
     }
 
-    /// Time from the beginning, s.
-    pub fn time(&self) -> f64 {
-        self.rig.time()
-    }
-
-    /// Runs one period.
-    fn step(&mut self) {
-        let (t, is_recorded) = (self.time(), self.rig.periods().is_multiple_of(TRACE_EVERY));
-        self.rig.step();
-        let (plant, seen) = (&self.rig.plant, &mut self.trial);
-        seen.peak_a = plant.phase_currents().iter().fold(seen.peak_a, |a, i| a.max(i.abs()));
-        let (least, most) = seen.dc_link_v;
-        let v = plant.dc_link();
-        seen.dc_link_v = (least.min(v), most.max(v));
-        if let Some(trace) = self.trace.as_mut().filter(|_| is_recorded) {
-            let regulates = self.rig.drive.state().regulates();
-            trace.push(Moment {
-                t,
-                error_deg: if regulates { self.error_deg } else { f64::NAN },
-                rpm: self.rig.rpm(),
-                torque: plant.torque(),
-                current: plant.current().norm(),
-                flux: plant.rotor_flux(),
-                dc_link: v,
-            });
-        }
-    }
-
-    /// Runs for some seconds, whatever the drive does.
-    pub fn coast(&mut self, seconds: f64) {
-        (0..(seconds * RATE_HZ).round() as u64).for_each(|_| self.step());
-    }
-
-    /// Runs until the drive is off, stopped by a fault or regulating, or for this many seconds.
-    pub fn wait(&mut self, seconds: f64) -> State {
-        for _ in 0..(seconds * RATE_HZ) as u64 {
-            self.step();
-            let state = self.rig.drive.state();
-            if state.regulates() || state.is_off() {
-                break;
-            }
-        }
-        self.rig.drive.state()
-    }
-
     /// Starts, and waits until the drive regulates. If it does not, the run has ended.
     pub fn start(&mut self) {
-        let refused = match self.rig.command(&Command::Start(self.mode)) {
-            Err(why) => Refused::Otherwise(why.to_string()),
-            Ok(_) => match self.wait(LONGEST_START_S) {
-                state if state.regulates() => return,
-                State::Fault(fault) => Refused::Start(fault.code()),
-                other => Refused::Otherwise(format!("the drive is {other}")),
-            },
+        let mode = if self.shaft == Shaft::Free { Mode::Speed } else { Mode::Torque };
+        self.trial.refused = match self.rig.begin(mode) {
+            Ok(state) if state.regulates() => None,
+            Ok(State::Fault(fault)) => Some(Refused::Start(fault.code())),
+            Ok(other) => Some(Refused::Otherwise(format!("the drive is {other}"))),
+            Err(why) => Some(Refused::Otherwise(why.to_string())),
         };
-        (self.trial.refused, self.has_ended) = (Some(refused), true);
+        self.has_ended = self.trial.refused.is_some();
     }
 
-    /// Brings a held shaft up to speed without torque.
+    /// Starts at rest, and brings a held shaft up to speed without torque.
     ///
     /// # Errors
     /// If the speed is out of range.
     pub fn bring_up(&mut self) -> Result<(), Error> {
+        self.start();
         let Shaft::Held(rpm) = self.shaft else { return Ok(()) };
         let speed = self.config.rpm(rpm) * TAU / 60.0;
         let steps = (rpm.abs() / RAMP_RPM_PER_S / PACE_S).ceil() as u32;
@@ -222,7 +154,7 @@ impl<'a> Bench<'a> {
 
     /// Counts the error after this many seconds.
     pub fn count_after(&mut self, seconds: f64) {
-        self.counted_from = Some(self.time() + seconds);
+        self.counted_from = Some(self.rig.time() + seconds);
     }
 
     /// Runs the parts.
@@ -231,7 +163,7 @@ impl<'a> Bench<'a> {
     /// If the plant refuses a change, or the drive a reference.
     pub fn follow(&mut self, parts: &[Part]) -> Result<(), Error> {
         for part in parts {
-            if self.mode == Mode::Speed {
+            if self.shaft == Shaft::Free {
                 self.rig.set_load(Load::Free { torque: part.load_nm })?;
             }
             let steps = f64::from(part.steps());
@@ -240,7 +172,9 @@ impl<'a> Bench<'a> {
                     return Ok(());
                 }
                 let n = f64::from(n);
-                self.change(part.change, n, steps)?;
+                if !self.change(part.change, n, steps)? {
+                    return Ok(());
+                }
                 if let Some(reference) = part.reference {
                     self.command(reference.after(n, steps))?;
                 }
@@ -250,8 +184,8 @@ impl<'a> Bench<'a> {
         Ok(())
     }
 
-    /// Makes a change, as far as it is in this one of all steps.
-    fn change(&mut self, change: Change, n: f64, steps: f64) -> Result<(), Error> {
+    /// Makes a change, as far as it is in this one of all steps; returns whether the course goes on.
+    fn change(&mut self, change: Change, n: f64, steps: f64) -> Result<bool, Error> {
         let (config, plant) = (self.config, &mut self.rig.plant);
         let done = match change {
             Change::Flux(degrees) if n == 1.0 => {
@@ -263,7 +197,8 @@ impl<'a> Bench<'a> {
             }
             Change::Mains(volts) => plant.set_mains(volts),
             Change::Shaft(rpm) => {
-                return self.rig.turn(config.rpm(rpm.after(n, steps)));
+                self.rig.turn(config.rpm(rpm.after(n, steps)))?;
+                Ok(())
             }
             Change::DcLink(share) => {
                 plant.set_dc_link(config.inverter.dc_link_v * share.after(n, steps))
@@ -273,21 +208,68 @@ impl<'a> Bench<'a> {
                 let warmer = |ohm: f64, rise: f64| ohm * (1.0 + rise * share);
                 plant.set_resistances(warmer(machine.rs, stator), warmer(machine.rr, rotor))
             }
+            Change::Start => return self.bring_up().map(|()| true),
+            Change::FlyingStart(rpm) => return self.flying_start(config.rpm(rpm)),
+            Change::Coast(seconds) => {
+                // A drive that has stopped itself refuses this command.
+                let _ = self.rig.command(&Command::Stop(Stop::Coast));
+                self.rig.wait_until(LONGEST_COAST_S, State::is_off);
+                self.rig.wait(seconds);
+                Ok(())
+            }
+            Change::Brake => return self.brake(),
+            Change::Count(seconds) => {
+                self.count_after(seconds);
+                Ok(())
+            }
             Change::Nothing | Change::Flux(_) => Ok(()),
         };
-        done.map_err(Error::refused)
+        done.map(|()| true).map_err(Error::refused)
+    }
+
+    /// Starts while a dynamometer turns the shaft, rpm; returns whether the drive has found the flux.
+    fn flying_start(&mut self, rpm: f64) -> Result<bool, Error> {
+        self.rig.turn(rpm)?;
+        let from = self.rig.time();
+        self.rig.peak_a = 0.0;
+        self.start();
+        // The error of the first samples belongs to the search for the flux.
+        let before = self.trial.largest_deg;
+        self.watch(LOOK_S);
+        while self.has_ended || self.error_deg.abs() >= CAUGHT_DEG {
+            if self.has_ended || self.rig.time() - from > LONGEST_CATCH_S {
+                return Ok(false);
+            }
+            self.watch(LOOK_S);
+        }
+        self.trial.largest_deg = before;
+        self.trial.took_s = Some(self.rig.time() - from);
+        Ok(true)
+    }
+
+    /// Brakes to standstill; returns whether the shaft has stopped.
+    fn brake(&mut self) -> Result<bool, Error> {
+        let from = self.rig.time();
+        let stopped = self.config.rpm(STOPPED_RPM) * TAU / 60.0;
+        self.command(0.0)?;
+        while self.rig.plant.mechanical_speed().abs() > stopped {
+            self.watch(BRAKED_S);
+            if self.has_ended || self.rig.time() - from > LONGEST_STOP_S {
+                return Ok(false);
+            }
+        }
+        self.trial.took_s = Some(self.rig.time() - from);
+        Ok(true)
     }
 
     /// Commands a reference of a part.
     fn command(&mut self, reference: f64) -> Result<(), Error> {
-        match self.mode {
-            Mode::Speed => {
-                let rpm = self.config.rpm(reference) as f32;
-                self.taken = rpm.into();
-                self.rig.command(&Command::Speed(rpm)).map(drop)
-            }
-            _ => self.command_torque(share_of_limit(self.config, reference)),
+        if self.shaft != Shaft::Free {
+            return self.command_torque(share_of_limit(self.config, reference));
         }
+        let rpm = self.config.rpm(reference) as f32;
+        self.taken = rpm.into();
+        self.rig.command(&Command::Speed(rpm)).map(drop)
     }
 
     /// Commands a q-axis current, A peak, which the drive may limit, unless the run has ended.
@@ -319,38 +301,39 @@ impl<'a> Bench<'a> {
             if self.has_ended {
                 return;
             }
-            let (t, plant) = (self.time(), &self.rig.plant);
-            let (flux, torque) = (plant.rotor_flux(), plant.torque());
-            self.step();
-            let drive = &self.rig.drive;
-            if !drive.state().regulates() {
+            let point = self.rig.point();
+            if point.regulates {
+                self.look(&point);
+            } else {
                 self.has_ended = true;
-                return;
             }
-            let estimate = f64::from(drive.telemetry().phi.to_turns());
-            let error = wrapped_degrees(flux.arg() - estimate * TAU);
-            let share = flux.norm() / self.nominal_flux;
-            self.error_deg = error;
-            let (wrong, flux_off) =
-                (error.abs() > self.wrong_deg, share < FLUX_OFF.0 || share > FLUX_OFF.1);
-            let states = [wrong, error.abs() > LOST_DEG, flux_off];
-            self.lasting.iter_mut().zip(states).for_each(|(lasting, is)| lasting.push(t, is));
-            self.is_off = wrong || flux_off;
-            if !self.turned {
-                self.trial.largest_deg = self.trial.largest_deg.max(error.abs());
-            }
-            if self.counted_from.is_some_and(|from| t >= from) {
-                self.trial.error.push(error);
-                self.torque.push(torque);
-                self.counts[(error.abs() * CLASSES_PER_DEG) as usize] += 1;
-            }
-            self.was_off |= self.is_off && (self.turned || self.counted_from.is_some());
         }
     }
 
+    /// Judges a sample.
+    fn look(&mut self, point: &Point) {
+        let (error, share) = (point.angle_error_deg, point.flux / self.nominal_flux);
+        self.error_deg = error;
+        let wrong = error.abs() > self.wrong_deg;
+        let flux_off = share < FLUX_OFF.0 || share > FLUX_OFF.1;
+        let states = [wrong, error.abs() > LOST_DEG, flux_off];
+        self.lasting.iter_mut().zip(states).for_each(|(lasting, is)| lasting.push(point.t, is));
+        self.is_off = wrong || flux_off;
+        if !self.turned {
+            self.trial.largest_deg = self.trial.largest_deg.max(error.abs());
+        }
+        if self.counted_from.is_some_and(|from| point.t >= from) {
+            self.trial.error.push(error);
+            self.torque.push(point.torque);
+            self.counts[(error.abs() * CLASSES_PER_DEG) as usize] += 1;
+        }
+        self.was_off |= self.is_off && (self.turned || self.counted_from.is_some());
+    }
+
     /// Returns the result of the run, and its curves.
-    pub fn finish(self) -> (Trial, Vec<Moment>) {
-        let mut trial = self.trial;
+    pub fn finish(self) -> (Trial, Vec<Point>) {
+        let (peak_a, dc_link_v) = (self.rig.peak_a, self.rig.dc_link_v);
+        let mut trial = Trial { peak_a, dc_link_v, ..self.trial };
         let stopped = self.has_ended && trial.refused.is_none();
         if let (true, State::Fault(fault)) = (stopped, self.rig.drive.state()) {
             trial.trip = Some(fault.code());
@@ -360,7 +343,7 @@ impl<'a> Bench<'a> {
         trial.stuck = !stopped && self.is_off && trial.is_silent();
         let classes = (0..).zip(self.counts).filter(|(_, count)| *count > 0);
         trial.histogram = classes.collect();
-        (trial, self.trace.unwrap_or_default())
+        (trial, self.rig.trace.unwrap_or_default())
     }
 }
 

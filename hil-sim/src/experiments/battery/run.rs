@@ -17,10 +17,10 @@ const LONGEST_LEARNING_S: f64 = 1000.0;
 /// # Errors
 /// If the plant is refused, or the drive neither learns nor gives a reason.
 pub fn learned(config: &Config, drive: Drive, seed: u64) -> Result<Result<Drive, u8>, Error> {
-    let mut bench = Bench::new(config, &drive, Shaft::Locked, seed)?;
-    bench.rig.command(&Command::Start(Mode::Learning))?;
-    match bench.wait(LONGEST_LEARNING_S) {
-        State::Off => Ok(Ok(bench.rig.drive)),
+    let mut rig = Bench::new(config, &drive, Shaft::Locked, seed)?.rig;
+    rig.command(&Command::Start(Mode::Learning))?;
+    match rig.wait_until(LONGEST_LEARNING_S, State::is_off) {
+        State::Off => Ok(Ok(rig.drive)),
         State::Fault(fault) => Ok(Err(fault.code())),
         other => Err(Error::Internal(format!(
             "after {LONGEST_LEARNING_S} s of learning the drive is {other}"
@@ -42,7 +42,6 @@ pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Tr
     let drawn = if kind.shaft() == Shaft::Free { &mut result.rpm } else { &mut result.i_q };
     *drawn = references.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
     result.limit_share = allowed_a(drive, nominal).ok().map(|taken| taken / nominal);
-    bench.start();
     bench.bring_up()?;
     bench.count_after(SETTLING_S);
     bench.follow(&parts)?;
@@ -104,21 +103,20 @@ mod tests {
             // The long hold is not needed.
             parts.last_mut().unwrap().seconds = 0.5;
             let mut bench = Bench::new(&config, &drive, kind.shaft(), seed).unwrap();
-            bench.trace = Some(Vec::new());
+            bench.rig.trace = Some(Vec::new());
             bench.start();
-            let started = bench.time();
+            let started = bench.rig.time();
             bench.follow(&parts).unwrap();
             assert!(!bench.has_ended, "{seed}");
             // Frequency of the flux over 0.2 s, Hz, in the direction of the torque.
-            let moments = bench.trace.unwrap();
+            let moments = bench.rig.trace.unwrap();
             let torque: Vec<_> = moments.iter().filter(|m| m.t > started + 1.5).collect();
             let hz: Vec<f64> = torque
                 .windows(41)
                 .map(|m| {
-                    let turned = m.windows(2).map(|two| {
-                        let change = two[1].flux.arg() - two[0].flux.arg();
-                        crate::rig::wrapped_degrees(change) / 360.0
-                    });
+                    let turned = m
+                        .windows(2)
+                        .map(|two| crate::rig::wrapped_degrees(two[1].phi - two[0].phi) / 360.0);
                     sign * turned.sum::<f64>() / (m[40].t - m[0].t)
                 })
                 .collect();

@@ -1,7 +1,7 @@
 //! The verdict on the runs, for each kind and region.
 
 use super::case::Case;
-use crate::experiments::battery::{Moment, Refused, Trial};
+use crate::experiments::battery::{Refused, Trial};
 use crate::prelude::*;
 
 /// Whether a run was lost: stopped by a fault, or beyond 45°. After a rotation of the flux neither counts.
@@ -113,16 +113,17 @@ fn failure(case: &Case, run: &Trial) -> Option<String> {
 }
 
 /// Draws the curves of one run.
-pub fn figure(moments: &[Moment]) -> Figure {
-    let panel = |label: &str, of: fn(&Moment) -> f64| {
-        let points = moments.iter().map(|m| (m.t, of(m))).filter(|(_, y)| y.is_finite());
-        Panel::new("time (s)", label).with(Series::line("run", points.collect()))
+pub fn figure(points: &[Point]) -> Figure {
+    let panel = |label: &str, of: fn(&Point) -> f64| {
+        let line = points.iter().map(|p| (p.t, of(p))).filter(|(_, y)| y.is_finite());
+        Panel::new("time (s)", label).with(Series::line("run", line.collect()))
     };
+    let error_deg = |p: &Point| if p.regulates { p.angle_error_deg } else { f64::NAN };
     Figure::new("run", "One run", "")
-        .panel(panel("angle error (°)", |m| m.error_deg))
-        .panel(panel("speed (rpm)", |m| m.rpm))
-        .panel(panel("torque (Nm)", |m| m.torque))
-        .panel(panel("current (A)", |m| m.current))
-        .panel(panel("rotor flux (Wb)", |m| m.flux.norm()))
-        .panel(panel("dc link (V)", |m| m.dc_link))
+        .panel(panel("angle error (°)", error_deg))
+        .panel(panel("speed (rpm)", |p| p.speed_rpm))
+        .panel(panel("torque (Nm)", |p| p.torque))
+        .panel(panel("current (A)", |p| p.current))
+        .panel(panel("rotor flux (Wb)", |p| p.flux))
+        .panel(panel("dc link (V)", |p| p.dc_link))
 }

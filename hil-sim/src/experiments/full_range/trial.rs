@@ -1,8 +1,8 @@
-//! One run, and its record.
+//! The course of a run, and its result.
 
 use super::case::Case;
-use crate::experiments::battery::{Bench, LONGEST_START_S, Moment, Trial, nominal_limit_a};
-use crate::experiments::course::{Change, Part, Ramp, Shaft};
+use crate::experiments::battery::{Bench, Trial, nominal_limit_a};
+use crate::experiments::course::{Change, Part, Ramp};
 use crate::prelude::*;
 
 /// Smallest and largest constant q-axis current, relative to the current limit.
@@ -17,17 +17,11 @@ const TURN_DEG: (f64, f64) = (90.0, 180.0);
 /// Relative rise of the resistances of stator and rotor on a hot ramp, and its duration, s.
 const RISE: (f64, f64) = (0.2, 0.3);
 const WARMING_S: f64 = 3.0;
-/// Error within which a flying start has found the flux, degrees, and the longest time for it, s.
-const CAUGHT_DEG: f64 = 15.0;
-const LONGEST_CATCH_S: f64 = 3.0;
 /// Time without current before a start with residual flux, s.
 const OFF_S: (f64, f64) = (0.02, 0.3);
-/// Inertia of the braked shaft relative to the motor's, its ramp, rpm/s on four poles, and the longest stop, s.
+/// Inertia of the braked shaft relative to the motor's, and its ramp, rpm/s on four poles.
 const HEAVY: f64 = 5.0;
 const HEAVY_RAMP_RPM_PER_S: f64 = 300.0;
-const LONGEST_STOP_S: f64 = 60.0;
-/// Speed below which the shaft counts as stopped, rpm on four poles.
-const STOPPED_RPM: f64 = 30.0;
 /// The dc link of braking and outage: capacitor, resistance of the mains, other load.
 const CAPACITOR_F: f64 = 470e-6;
 const SOURCE_OHM: f64 = 2.0;
@@ -52,23 +46,17 @@ pub fn set_up(case: Case, config: &mut Config) {
     }
 }
 
-/// A run: the bench, and its random values.
-pub struct Run<'a> {
-    case: Case,
+/// Random values of a run on the dissertation's motor: its speed, rpm on four poles, and its q-axis current, A; and the
+/// parts of its course.
+pub struct Drawn {
     rpm: f64,
     i_q: f64,
-    sign: f64,
-    turn_deg: f64,
-    off_s: f64,
-    bench: Bench<'a>,
+    parts: Vec<Part>,
 }
 
-impl<'a> Run<'a> {
-    /// Makes a run with a copy of a drive that is off; the configuration comes from [`set_up`].
-    ///
-    /// # Errors
-    /// If the plant is refused.
-    pub fn new(case: Case, config: &'a Config, drive: &Drive, seed: u64) -> Result<Self, Error> {
+impl Drawn {
+    /// Draws a run of a case; the configuration comes from [`set_up`].
+    pub fn of(case: Case, config: &Config, seed: u64) -> Self {
         let mut random = seeded(seed);
         let rpm = case.speed(&mut random);
         let per_a = config.amperes(1.0);
@@ -79,148 +67,82 @@ impl<'a> Run<'a> {
         let sign = sign(&mut random);
         let turn_deg = sign * random.random_range(TURN_DEG.0..=TURN_DEG.1);
         let off_s = random.random_range(OFF_S.0..=OFF_S.1);
-        let mut bench = Bench::new(config, drive, case.shaft(rpm), seed)?;
-        bench.trial = Trial { case: case.name(), rpm, i_q, ..bench.trial };
-        bench.wrong_deg = LOST_DEG;
-        Ok(Self { case, rpm, i_q, sign, turn_deg, off_s, bench })
-    }
 
-    /// Does the run; with `traced` it also returns the curves.
-    ///
-    /// # Errors
-    /// If the plant is refused, or the drive refuses a reference.
-    pub fn run(mut self, traced: bool) -> Result<(Trial, Vec<Moment>), Error> {
-        self.bench.trace = traced.then(Vec::new);
-        self.course()?;
-        Ok(self.bench.finish())
-    }
-
-    fn course(&mut self) -> Result<(), Error> {
-        match self.case.kind {
-            RangeKind::TurningStart => {}
-            RangeKind::Ramps | RangeKind::HotRamps => self.bench.start(),
-            _ => self.up_to_speed()?,
-        }
-        if self.bench.has_ended {
-            return Ok(());
-        }
-        match self.case.kind {
-            RangeKind::TurningStart => return self.turning_start(),
-            RangeKind::ResidualStart => {
-                // A drive that has stopped itself refuses this command.
-                let _ = self.bench.rig.command(&Command::Stop(Stop::Coast));
-                self.bench.wait(LONGEST_START_S);
-                self.bench.coast(self.off_s);
-                return self.turning_start();
+        let at = Part::constant;
+        let event = |change| Part::unchanged(change, 0.0);
+        let ramp_s = config.rpm(rpm.abs()) / f64::from(config.drive.ramp_rpm_per_s());
+        let counted = |before: &[Part], settling_s, parts: &[Part]| {
+            [&[event(Change::Start)], before, &[event(Change::Count(settling_s))], parts].concat()
+        };
+        let held = |parts: &[Part]| counted(&[], 0.5, parts);
+        let regulated = |parts: &[Part]| counted(&[at(rpm, ramp_s + 1.5)], 0.0, parts);
+        let caught =
+            [event(Change::FlyingStart(rpm)), event(Change::Count(0.1)), at(sign * CAUGHT_A, 0.7)];
+        let parts = match case.kind {
+            RangeKind::All | RangeKind::Constant | RangeKind::WrongParameters => {
+                held(&[at(i_q, 3.5)])
             }
-            RangeKind::LoadSteps | RangeKind::Ramps | RangeKind::HotRamps | RangeKind::Outage => {
-                self.bench.count_after(0.0);
-            }
-            RangeKind::Braking => return self.braking(),
-            _ => self.bench.count_after(0.5),
-        }
-        self.bench.follow(&self.parts())?;
-        let is_constant =
-            matches!(self.case.kind, RangeKind::Constant | RangeKind::WrongParameters);
-        if is_constant && !self.bench.has_ended {
-            let taken = f64::from(self.bench.rig.drive.telemetry().reference.q);
-            self.bench.trial.torque_error = Some(self.bench.torque_error(taken));
-        }
-        Ok(())
-    }
-
-    /// Starts at rest and brings the shaft up to speed, without torque or by the drive's regulation.
-    fn up_to_speed(&mut self) -> Result<(), Error> {
-        self.bench.start();
-        if self.case.shaft(self.rpm) != Shaft::Free {
-            return self.bench.bring_up();
-        }
-        self.bench.follow(&[Part::constant(self.rpm, self.ramp_s() + 1.5)])
-    }
-
-    /// Time of the ramp to the speed of the run, s.
-    fn ramp_s(&self) -> f64 {
-        let config = self.bench.config;
-        config.rpm(self.rpm.abs()) / f64::from(config.drive.ramp_rpm_per_s())
-    }
-
-    /// Returns the parts of a run that consists of nothing else.
-    fn parts(&self) -> Vec<Part> {
-        let (rpm, i_q, config) = (self.rpm, self.i_q, self.bench.config);
-        let at = |value: f64, seconds| Part::constant(value, seconds);
-        match self.case.kind {
             RangeKind::Reversals => {
-                let step = self.sign * STEP_A.min(nominal_limit_a(config) / config.amperes(1.0));
-                [step, -step, step, 0.0, -step].map(|a| at(a, 0.6)).to_vec()
+                let step = sign * STEP_A.min(most);
+                held(&[step, -step, step, 0.0, -step].map(|a| at(a, 0.6)))
             }
             RangeKind::LoadSteps => {
-                let nm = self.sign * LOAD_NM;
+                let nm = sign * LOAD_NM;
                 let loaded = |nm| Part { load_nm: config.newton_metres(nm), ..at(rpm, 1.0) };
-                [nm, 0.0, -nm, 0.0].map(loaded).to_vec()
+                regulated(&[nm, 0.0, -nm, 0.0].map(loaded))
             }
             RangeKind::Ramps | RangeKind::HotRamps => {
                 // Through zero and back, with or without warming of the motor on the way.
-                let once = self.ramp_s();
                 let warming = Part::unchanged(Change::Warming(RISE.0, RISE.1), WARMING_S);
-                let warms = (self.case.kind == RangeKind::HotRamps).then_some(warming);
-                let back = [at(-rpm, 2.0 * once + 0.7), at(0.0, once + 1.0)];
-                [at(rpm, once + 0.7)].into_iter().chain(warms).chain(back).collect()
+                let warms = (case.kind == RangeKind::HotRamps).then_some(warming);
+                let back = [at(-rpm, 2.0 * ramp_s + 0.7), at(0.0, ramp_s + 1.0)];
+                counted(&[], 0.0, &[&[at(rpm, ramp_s + 0.7)], warms.as_slice(), &back].concat())
             }
             RangeKind::TurnedFlux => {
-                let change = Change::Flux(self.turn_deg);
-                vec![at(i_q, 1.0), Part { change, ..at(i_q, 3.0) }]
+                let change = Change::Flux(turn_deg);
+                held(&[at(i_q, 1.0), Part { change, ..at(i_q, 3.0) }])
             }
+            RangeKind::TurningStart => caught.to_vec(),
+            RangeKind::ResidualStart => {
+                [&[event(Change::Start), event(Change::Coast(off_s))], &caught[..]].concat()
+            }
+            RangeKind::Braking => regulated(&[event(Change::Brake)]),
             RangeKind::Outage => {
                 let mains = |volts, s| Part { change: Change::Mains(volts), ..at(rpm, s) };
-                vec![mains(0.0, OUTAGE_S), mains(config.inverter.dc_link_v, 2.0)]
+                regulated(&[mains(0.0, OUTAGE_S), mains(config.inverter.dc_link_v, 2.0)])
             }
             RangeKind::Sag => {
                 // The voltage of a stiff dc link falls and returns under torque.
                 let sag = |from, to| Part::unchanged(Change::DcLink(Ramp(from, to)), SAG_RAMP_S);
-                let held = Part::unchanged(Change::Nothing, SAG_S);
-                vec![at(i_q, 1.0), sag(1.0, SAG), held, sag(SAG, 1.0), held]
+                let low = Part::unchanged(Change::Nothing, SAG_S);
+                held(&[at(i_q, 1.0), sag(1.0, SAG), low, sag(SAG, 1.0), low])
             }
-            _ => vec![at(i_q, 3.5)],
-        }
+        };
+        Self { rpm, i_q, parts }
     }
+}
 
-    /// Starts while a dynamometer turns the shaft, then commands torque.
-    fn turning_start(&mut self) -> Result<(), Error> {
-        let bench = &mut self.bench;
-        bench.rig.turn(bench.config.rpm(self.rpm))?;
-        let from = bench.time();
-        bench.trial.peak_a = 0.0;
-        bench.start();
-        // The error of the first samples belongs to the search for the flux.
-        let before = bench.trial.largest_deg;
-        loop {
-            bench.watch(1.0 / 600.0);
-            if !bench.has_ended && bench.error_deg.abs() < CAUGHT_DEG {
-                break;
-            }
-            if bench.has_ended || bench.time() - from > LONGEST_CATCH_S {
-                return Ok(());
-            }
-        }
-        bench.trial.largest_deg = before;
-        bench.trial.took_s = Some(bench.time() - from);
-        bench.count_after(0.1);
-        bench.follow(&[Part::constant(self.sign * CAUGHT_A, 0.7)])
+/// Does a run with a copy of a drive that is off; with `traced` it also returns the curves.
+///
+/// # Errors
+/// If the plant is refused, or the drive refuses a reference.
+pub fn trial(
+    case: Case,
+    config: &Config,
+    drive: &Drive,
+    seed: u64,
+    traced: bool,
+) -> Result<(Trial, Vec<Point>), Error> {
+    let Drawn { rpm, i_q, parts } = Drawn::of(case, config, seed);
+    let mut bench = Bench::new(config, drive, case.shaft(rpm), seed)?;
+    bench.trial = Trial { case: case.name(), rpm, i_q, ..bench.trial };
+    bench.wrong_deg = LOST_DEG;
+    bench.rig.trace = traced.then(Vec::new);
+    bench.follow(&parts)?;
+    let is_constant = matches!(case.kind, RangeKind::Constant | RangeKind::WrongParameters);
+    if is_constant && !bench.has_ended {
+        let taken = f64::from(bench.rig.drive.telemetry().reference.q);
+        bench.trial.torque_error = Some(bench.torque_error(taken));
     }
-
-    /// Brakes from full speed to standstill.
-    fn braking(&mut self) -> Result<(), Error> {
-        let bench = &mut self.bench;
-        let from = bench.time();
-        bench.count_after(0.0);
-        let stopped = bench.config.rpm(STOPPED_RPM) * TAU / 60.0;
-        while bench.rig.plant.mechanical_speed().abs() > stopped {
-            bench.follow(&[Part::constant(0.0, 0.02)])?;
-            if bench.has_ended || bench.time() - from > LONGEST_STOP_S {
-                return Ok(());
-            }
-        }
-        bench.trial.took_s = Some(bench.time() - from);
-        Ok(())
-    }
+    Ok(bench.finish())
 }
