@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 
 pub use bench::Bench;
 pub use kind::{KINDS, Kind, allowed_a, nominal_limit_a, torque_limit_a, torque_nm};
-pub use run::{learned, trial};
+pub use run::{learned_drive, trial};
 pub use summary::Summary;
 pub use trial::{Refused, Trial};
 
@@ -78,14 +78,13 @@ impl Battery {
     fn drive(&self, number: usize) -> Result<&Learnt, Error> {
         let (group, config) = (self.group(number), &self.config);
         once(&self.drives[group], || {
-            let drive = Drive::new(built(&config.drive)?);
-            if !(config.prepare.learn && config.drive.tracks_synchronously()) {
-                return Ok(Ok(drive));
+            if !config.prepare.learn {
+                return Ok(Ok(Drive::new(built(&config.drive)?)));
             }
             let mut bench = config.clone();
             disturbed::add(&mut bench, &disturbed::ALWAYS, &self.sizes(number)[0]);
             let seed = if group == 0 { self.seed } else { seed_of(self.seed, group) ^ LEARNING };
-            learned(&bench, drive, seed)
+            learned_drive(&bench, seed)
         })
     }
 

@@ -188,7 +188,7 @@ impl Study for Commission {
             staircase_seconds: session.until(Step::Staircase) - session.until(Step::Leakage),
             loop_seconds: session.seconds - session.until(Step::Staircase),
             shaft_deg: session.shaft_deg,
-            current: session.largest_a / f64::from(settings.rated_a()),
+            current: session.rig.peak_a / f64::from(settings.rated_a()),
             told,
         })
     }

@@ -1,4 +1,4 @@
-//! A run over time: its parts one after the other, what changes in them, and the shaft. The bench of the stress test runs it.
+//! A run over time: the shaft, the parts one after the other, and what changes in them. The bench of the stress test runs it.
 
 /// A value at the beginning and at the end of a part, with a straight line between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,6 +65,11 @@ impl Part {
         Self { reference: None, load_nm: 0.0, change, seconds }
     }
 
+    /// Makes a part that consists of an event.
+    pub fn event(change: Change) -> Self {
+        Self::unchanged(change, 0.0)
+    }
+
     /// Returns the number of steps in which its values change.
     pub fn steps(&self) -> u32 {
         let pace_s = match self.change {
@@ -78,6 +83,23 @@ impl Part {
     }
 }
 
+/// A run over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Course {
+    /// The shaft.
+    pub shaft: Shaft,
+    /// The parts, one after the other.
+    pub parts: Vec<Part>,
+}
+
+impl Course {
+    /// Makes a course that starts at rest and runs up; the angle error counts from this time after the run-up, s.
+    pub fn from_rest(shaft: Shaft, run_up: &[Part], settling_s: f64, parts: &[Part]) -> Self {
+        let (start, count) = (Part::event(Change::Start), Part::event(Change::Count(settling_s)));
+        Self { shaft, parts: [&[start], run_up, &[count], parts].concat() }
+    }
+}
+
 /// The shaft in a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shaft {
@@ -87,4 +109,11 @@ pub enum Shaft {
     Held(f64),
     /// The shaft is free; the drive regulates its speed.
     Free,
+}
+
+impl Shaft {
+    /// Returns the shaft at a constant speed, rpm.
+    pub fn at(rpm: i16) -> Self {
+        if rpm == 0 { Self::Locked } else { Self::Held(rpm.into()) }
+    }
 }

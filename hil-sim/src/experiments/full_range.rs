@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 
 use case::Case;
 
-use super::battery::{Learnt, Trial, learned, once};
+use super::battery::{Learnt, Trial, learned_drive, once};
 use super::commission::commissioned;
 use crate::config::{FluxLevel, RangeKind};
 use crate::prelude::*;
@@ -56,15 +56,6 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
     }
     check_model(&config)?;
     Ok(config)
-}
-
-/// Returns a drive of this configuration, off. It has learned if it can, or it refused to with a fault of this number.
-///
-/// # Errors
-/// If the settings are refused.
-pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
-    let drive = Drive::new(built(&config.drive)?);
-    if config.drive.tracks_synchronously() { learned(config, drive, seed) } else { Ok(Ok(drive)) }
 }
 
 /// The runs, with the cases in alternation.

@@ -2,8 +2,7 @@
 
 use std::f64::consts::SQRT_2;
 
-use super::battery::{allowed_a, torque_limit_a, torque_nm};
-use super::full_range::learned_drive;
+use super::battery::{allowed_a, learned_drive, torque_limit_a, torque_nm};
 use crate::prelude::*;
 
 /// Relative difference below which two values are the same limit.

@@ -2,7 +2,7 @@
 
 use super::disturbed::Asymmetry;
 use crate::config::BatteryRuns;
-use crate::experiments::course::{Change, Part, Ramp, Shaft};
+use crate::experiments::course::{Change, Course, Part, Ramp, Shaft};
 use crate::prelude::*;
 
 /// A kind of run. Currents, speeds and torques are for the dissertation's motor; on others they are in proportion,
@@ -110,6 +110,8 @@ const LEAST_A: f64 = 0.5;
 /// Load, Nm, and the speeds at which it is applied, rpm.
 const LOAD_NM: f64 = 0.4;
 const LOAD_RPM: [f64; 4] = [0.0, 30.0, 150.0, -150.0];
+/// Time after the start that the statistics of the error exclude, s: the angle settles.
+const SETTLING_S: f64 = 0.5;
 /// Time between two changes of a q-axis current, s.
 const LEVEL_S: f64 = 0.5;
 /// Smallest and largest rotation of the flux, degrees, and the time before and after it, s.
@@ -153,44 +155,34 @@ impl Kind {
         matches!(self, Self::Forced(_) | Self::Restless { forced: true, .. })
     }
 
-    /// The shaft.
-    pub fn shaft(self) -> Shaft {
-        match self {
-            Self::Constant(0) | Self::Forced(0) => Shaft::Locked,
-            Self::Constant(rpm) | Self::Forced(rpm) => Shaft::Held(rpm.into()),
-            Self::Dragged(_) => Shaft::Held(0.0),
-            Self::Quadrants => Shaft::Held(DRAGGED_RPM.0),
-            Self::Steps | Self::Reversals | Self::Ramp | Self::Hold | Self::Restless { .. } => {
-                Shaft::Locked
-            }
-            Self::Speed(_) | Self::Load | Self::LoadStep(_) => Shaft::Free,
-        }
-    }
-
-    /// Returns the parts of a run, with random values.
-    pub fn parts(self, config: &Config, random: &mut impl Rng) -> Vec<Part> {
+    /// Returns the course of a run, with random values.
+    pub fn course(self, config: &Config, random: &mut impl Rng) -> Course {
         let sign = sign(random);
-        match self {
-            Self::Constant(_) => {
-                vec![Part::constant(sign * random.random_range(LEAST_A..=MOST_A), 3.0)]
+        let (shaft, parts) = match self {
+            Self::Constant(rpm) => {
+                let i_q = sign * random.random_range(LEAST_A..=MOST_A);
+                (Shaft::at(rpm), vec![Part::constant(i_q, 3.0)])
             }
             Self::Hold => {
-                vec![Part::constant(sign * random.random_range(0.75..=1.0) * MOST_A, 6.0)]
+                let i_q = sign * random.random_range(0.75..=1.0) * MOST_A;
+                (Shaft::Locked, vec![Part::constant(i_q, 6.0)])
             }
             Self::Steps => {
                 let mut i_q = || random.random_range(-MOST_A..=MOST_A);
-                (0..6).map(|_| Part::constant(i_q(), LEVEL_S)).collect()
+                (Shaft::Locked, (0..6).map(|_| Part::constant(i_q(), LEVEL_S)).collect())
             }
-            Self::Reversals => (0..4)
-                .map(|n| Part::constant(if n % 2 == 0 { sign } else { -sign } * MOST_A, 1.0))
-                .collect(),
+            Self::Reversals => {
+                let i_q = sign * MOST_A;
+                (Shaft::Locked, [i_q, -i_q, i_q, -i_q].map(|i_q| Part::constant(i_q, 1.0)).into())
+            }
             Self::Ramp => {
                 let ramp = Ramp(-sign * MOST_A, sign * MOST_A);
                 let reversal = Part { reference: Some(ramp), ..Part::constant(0.0, 3.0) };
-                vec![Part::constant(ramp.0, LEVEL_S), reversal]
+                (Shaft::Locked, vec![Part::constant(ramp.0, LEVEL_S), reversal])
             }
             Self::Speed(rpm) => {
-                vec![Part::constant(rpm.into(), 2.0), Part::constant(-f64::from(rpm), 2.0)]
+                let rpm = f64::from(rpm);
+                (Shaft::Free, [rpm, -rpm].map(|rpm| Part::constant(rpm, 2.0)).into())
             }
             Self::Load | Self::LoadStep(_) => {
                 let rpm = LOAD_RPM[random.random_range(0..LOAD_RPM.len())];
@@ -202,12 +194,12 @@ impl Kind {
                 };
                 // The load comes and goes while the speed is held.
                 let loaded = Part { load_nm, ..Part::constant(rpm, 2.0) };
-                vec![Part::constant(rpm, 1.5), loaded, Part::constant(rpm, 1.0)]
+                (Shaft::Free, vec![Part::constant(rpm, 1.5), loaded, Part::constant(rpm, 1.0)])
             }
-            Self::Forced(_) => {
+            Self::Forced(rpm) => {
                 let i_q = sign * random.random_range(0.0..=MOST_A);
                 let turned = Part { change: turn(random), ..Part::constant(i_q, TURN_S.1) };
-                vec![Part::constant(i_q, TURN_S.0), turned]
+                (Shaft::at(rpm), vec![Part::constant(i_q, TURN_S.0), turned])
             }
             Self::Dragged(_) => {
                 let i_q = sign * random.random_range(DRAGGED_SHARE..=1.0) * MOST_A;
@@ -222,16 +214,16 @@ impl Kind {
                     (vec![dragged(0.0, (0.0, braked), UNLOADED_RPM_PER_S)], (braked, 0.0))
                 };
                 parts.extend([held(DRAGGED_S.0), dragged(i_q, ends, rate), held(DRAGGED_S.1)]);
-                parts
+                (Shaft::Held(0.0), parts)
             }
             Self::Quadrants => {
                 let rate = (DRAGGED_RPM_PER_S.0 * DRAGGED_RPM_PER_S.1).sqrt();
-                let (there, back) =
-                    ((DRAGGED_RPM.0, -DRAGGED_RPM.0), (-DRAGGED_RPM.0, DRAGGED_RPM.0));
-                let mut drag = |sign: f64, rpm| {
-                    dragged(sign * random.random_range(LEAST_A..=MOST_A), rpm, rate)
+                let rpm = DRAGGED_RPM.0;
+                let ways = [(sign, rpm), (sign, -rpm), (-sign, rpm), (-sign, -rpm)];
+                let drag = |(sign, rpm): (f64, f64)| {
+                    dragged(sign * random.random_range(LEAST_A..=MOST_A), (rpm, -rpm), rate)
                 };
-                vec![drag(sign, there), drag(sign, back), drag(-sign, there), drag(-sign, back)]
+                (Shaft::Held(rpm), ways.map(drag).into())
             }
             Self::Restless { hz, forced } => {
                 let middle = sign * random.random_range(0.0..=MOST_A - RESTLESS_A);
@@ -243,9 +235,10 @@ impl Kind {
                     let change = if number == turned { turn } else { Change::Nothing };
                     Part { change, ..Part::constant(i_q, 1.0 / f64::from(hz)) }
                 });
-                steps.collect()
+                (Shaft::Locked, steps.collect())
             }
-        }
+        };
+        Course::from_rest(shaft, &[], SETTLING_S, &parts)
     }
 }
 
@@ -290,8 +283,8 @@ mod tests {
         config.battery.load_share = 0.62;
         let (kinds, runs) = chosen(&config);
         assert_eq!((kinds.as_slice(), runs), (&[Kind::LoadStep(620)][..], 32));
-        let parts = kinds[0].parts(&config, &mut seeded(1));
-        let loads: Vec<f64> = parts.iter().map(|part| part.load_nm.abs()).collect();
+        let course = kinds[0].course(&config, &mut seeded(1));
+        let loads: Vec<f64> = course.parts[2..].iter().map(|part| part.load_nm.abs()).collect();
         assert_eq!((loads[0], loads[2]), (0.0, 0.0));
         assert!((loads[1] - 1.637).abs() < 2e-3, "{loads:?}");
     }
@@ -315,8 +308,8 @@ mod tests {
     /// once. Torque of either sign is present while the speed passes zero in either direction.
     #[test]
     fn quadrants_are_all_four() {
-        let parts = Kind::Quadrants.parts(&Config::default(), &mut seeded(1));
-        let ways = parts.iter().map(|part| {
+        let course = Kind::Quadrants.course(&Config::default(), &mut seeded(1));
+        let ways = course.parts[2..].iter().map(|part| {
             let (Change::Shaft(rpm), i_q) = (part.change, part.reference.unwrap()) else {
                 panic!()
             };
@@ -334,7 +327,8 @@ mod tests {
         config.battery.runs = BatteryRuns::Restless;
         for kind in chosen(&config).0 {
             let Kind::Restless { hz, forced } = kind else { continue };
-            let parts = kind.parts(&config, &mut seeded(3));
+            let course = kind.course(&config, &mut seeded(3));
+            let parts = &course.parts[2..];
             assert_eq!(parts.len(), 5 * usize::from(hz));
             let seconds: f64 = parts.iter().map(|part| part.seconds).sum();
             assert!((seconds - 5.0).abs() < 1e-6, "{seconds}");

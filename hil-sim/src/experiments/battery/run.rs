@@ -1,22 +1,25 @@
 //! One run of the stress test.
 
+use super::Learnt;
 use super::bench::Bench;
 use super::kind::{Kind, allowed_a, nominal_limit_a};
 use super::trial::Trial;
-use crate::experiments::course::Shaft;
+use crate::experiments::course::{Course, Shaft};
 use crate::prelude::*;
 
-/// Time after the first reference that the statistics of the error exclude, s: the angle settles.
-const SETTLING_S: f64 = 0.5;
 /// Longest saliency self-commissioning, s.
 const LONGEST_LEARNING_S: f64 = 1000.0;
 
-/// Runs the saliency self-commissioning of a drive with the shaft locked; returns the drive, off, or the number of the
-/// fault with which it refused.
+/// Returns a drive of this configuration, off. If it tracks the saliency, it has run the saliency self-commissioning with
+/// the shaft locked, or it refused to with a fault of this number.
 ///
 /// # Errors
-/// If the plant is refused, or the drive neither learns nor gives a reason.
-pub fn learned(config: &Config, drive: Drive, seed: u64) -> Result<Result<Drive, u8>, Error> {
+/// If settings or plant are refused, or the drive neither learns nor gives a reason.
+pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
+    let drive = Drive::new(built(&config.drive)?);
+    if !config.drive.tracks_synchronously() {
+        return Ok(Ok(drive));
+    }
     let mut rig = Bench::new(config, &drive, Shaft::Locked, seed)?.rig;
     rig.command(&Command::Start(Mode::Learning))?;
     match rig.wait_until(LONGEST_LEARNING_S, State::is_off) {
@@ -33,17 +36,15 @@ pub fn learned(config: &Config, drive: Drive, seed: u64) -> Result<Result<Drive,
 /// # Errors
 /// If the plant is refused, or the drive refuses a command.
 pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Trial, Error> {
-    let parts = kind.parts(config, &mut seeded(seed));
+    let Course { shaft, parts } = kind.course(config, &mut seeded(seed));
     let nominal = nominal_limit_a(config);
-    let mut bench = Bench::new(config, drive, kind.shaft(), seed)?;
+    let mut bench = Bench::new(config, drive, shaft, seed)?;
     let result = &mut bench.trial;
     result.kind = Some(kind);
     let references = parts.iter().filter_map(|part| part.reference).map(|ramp| ramp.1);
-    let drawn = if kind.shaft() == Shaft::Free { &mut result.rpm } else { &mut result.i_q };
+    let drawn = if shaft == Shaft::Free { &mut result.rpm } else { &mut result.i_q };
     *drawn = references.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
     result.limit_share = allowed_a(drive, nominal).ok().map(|taken| taken / nominal);
-    bench.bring_up()?;
-    bench.count_after(SETTLING_S);
     bench.follow(&parts)?;
     if matches!(kind, Kind::Constant(_)) && !bench.has_ended {
         bench.trial.torque_error = Some(bench.torque_error(bench.taken));
@@ -95,18 +96,18 @@ mod tests {
         let (mut into, mut out_of, mut rates) = (0, 0, Vec::new());
         for seed in 0..12 {
             let kind = Kind::Dragged(Asymmetry::None);
-            let mut parts = kind.parts(&config, &mut seeded(seed));
+            let Course { shaft, mut parts } = kind.course(&config, &mut seeded(seed));
             let dragged = parts[parts.len() - 2];
             let Change::Shaft(rpm) = dragged.change else { panic!("{dragged:?}") };
             let sign = dragged.reference.unwrap().0.signum();
             rates.push((rpm.1 - rpm.0).abs() / dragged.seconds);
             // The long hold is not needed.
             parts.last_mut().unwrap().seconds = 0.5;
-            let mut bench = Bench::new(&config, &drive, kind.shaft(), seed).unwrap();
+            let mut bench = Bench::new(&config, &drive, shaft, seed).unwrap();
             bench.rig.trace = Some(Vec::new());
-            bench.start();
+            bench.follow(&parts[..1]).unwrap();
             let started = bench.rig.time();
-            bench.follow(&parts).unwrap();
+            bench.follow(&parts[1..]).unwrap();
             assert!(!bench.has_ended, "{seed}");
             // Frequency of the flux over 0.2 s, Hz, in the direction of the torque.
             let moments = bench.rig.trace.unwrap();

@@ -147,7 +147,7 @@ impl Study for Refusals {
             named: refusal.is_some_and(|refusal| (defect.named)(&refusal)),
             unchanged: off && session.commissioning.settings(&settings) == settings,
             seconds: session.seconds,
-            largest_a: session.largest_a,
+            largest_a: session.rig.peak_a,
         })
     }
 

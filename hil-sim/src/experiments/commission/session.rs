@@ -24,8 +24,6 @@ pub struct Session {
     pub seconds: f64,
     /// Largest rotation of the shaft, mechanical degrees.
     pub shaft_deg: f64,
-    /// Largest phase current, A.
-    pub largest_a: f64,
     /// Transient inductance of a motor with saturation at the operating points of the injection, mean along and across it, H.
     pub leakage: Option<f64>,
 }
@@ -67,7 +65,7 @@ impl Session {
         let mut commissioning = Commissioning::new(&settings);
         commissioning.start(Step::Nameplate, Step::LAST);
         let mut sums = Collector::default();
-        let (mut reports, mut shaft_deg, mut largest_a) = (Vec::new(), 0.0_f64, 0.0_f64);
+        let (mut reports, mut shaft_deg) = (Vec::new(), 0.0_f64);
         let (began, mut in_step) = (rig.time(), 0);
         let from = rig.plant.mechanical_angle();
         let mut carrier_on = AlphaBeta::ZERO;
@@ -86,7 +84,6 @@ impl Session {
             }
             let turned = (rig.plant.mechanical_angle() - from) * 360.0 / TAU;
             shaft_deg = shaft_deg.max(turned.abs());
-            largest_a = rig.plant.phase_currents().iter().fold(largest_a, |m, i| m.max(i.abs()));
             let aborted = outside.abort.filter(|(step, _)| *step == commissioning.step());
             if let Some((_, after)) = aborted.filter(|_| rig.drive.state() != State::Off) {
                 in_step += 1;
@@ -123,7 +120,7 @@ impl Session {
         let seconds = rig.time() - began;
         let [along, across] = leakage.map(|axis| axis.mean());
         let leakage = rig.plant.energy_model().map(|_| 0.5 * (along + across));
-        Ok(Self { rig, commissioning, reports, seconds, shaft_deg, largest_a, leakage })
+        Ok(Self { rig, commissioning, reports, seconds, shaft_deg, leakage })
     }
 
     /// Returns the time until the last report of a step up to this one, s.

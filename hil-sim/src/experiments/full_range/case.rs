@@ -1,6 +1,5 @@
 //! The cases: each kind in the regions of the speed for which it is intended.
 
-use crate::experiments::course::Shaft;
 use crate::prelude::*;
 
 /// Limits of the regions, rpm on four poles. The angle comes from the injection alone up to 450 rpm and from the
@@ -46,12 +45,6 @@ impl Case {
     /// Returns the name in words.
     pub fn words(&self) -> String {
         format!("{}, {} to {} rpm", self.kind.word(), self.region.0, self.region.1)
-    }
-
-    /// Returns the shaft at a speed, rpm on four poles.
-    pub fn shaft(&self, rpm: f64) -> Shaft {
-        let free = self.kind == RangeKind::LoadSteps || has_one_speed(self.kind);
-        if free { Shaft::Free } else { Shaft::Held(rpm) }
     }
 
     /// Returns a random speed in the region, of either sign, rpm on four poles; or the speed of the kinds that use only one.

@@ -2,7 +2,7 @@
 
 use super::case::Case;
 use crate::experiments::battery::{Bench, Trial, nominal_limit_a};
-use crate::experiments::course::{Change, Part, Ramp};
+use crate::experiments::course::{Change, Course, Part, Ramp, Shaft};
 use crate::prelude::*;
 
 /// Smallest and largest constant q-axis current, relative to the current limit.
@@ -46,80 +46,71 @@ pub fn set_up(case: Case, config: &mut Config) {
     }
 }
 
-/// Random values of a run on the dissertation's motor: its speed, rpm on four poles, and its q-axis current, A; and the
-/// parts of its course.
-pub struct Drawn {
-    rpm: f64,
-    i_q: f64,
-    parts: Vec<Part>,
-}
+/// Draws a run of a case: its speed, rpm on four poles, its q-axis current, A on the dissertation's motor, and its
+/// course. The configuration comes from [`set_up`].
+fn drawn(case: Case, config: &Config, seed: u64) -> (f64, f64, Course) {
+    let mut random = seeded(seed);
+    let rpm = case.speed(&mut random);
+    let per_a = config.amperes(1.0);
+    let most = nominal_limit_a(config) / per_a;
+    let limit = f64::from(config.drive.current_limit_a()) / per_a;
+    let share = random.random_range(TORQUE.0..=TORQUE.1);
+    let i_q = sign(&mut random) * most.min(share * limit);
+    let sign = sign(&mut random);
+    let turn_deg = sign * random.random_range(TURN_DEG.0..=TURN_DEG.1);
+    let off_s = random.random_range(OFF_S.0..=OFF_S.1);
 
-impl Drawn {
-    /// Draws a run of a case; the configuration comes from [`set_up`].
-    pub fn of(case: Case, config: &Config, seed: u64) -> Self {
-        let mut random = seeded(seed);
-        let rpm = case.speed(&mut random);
-        let per_a = config.amperes(1.0);
-        let most = nominal_limit_a(config) / per_a;
-        let limit = f64::from(config.drive.current_limit_a()) / per_a;
-        let share = random.random_range(TORQUE.0..=TORQUE.1);
-        let i_q = sign(&mut random) * most.min(share * limit);
-        let sign = sign(&mut random);
-        let turn_deg = sign * random.random_range(TURN_DEG.0..=TURN_DEG.1);
-        let off_s = random.random_range(OFF_S.0..=OFF_S.1);
-
-        let at = Part::constant;
-        let event = |change| Part::unchanged(change, 0.0);
-        let ramp_s = config.rpm(rpm.abs()) / f64::from(config.drive.ramp_rpm_per_s());
-        let counted = |before: &[Part], settling_s, parts: &[Part]| {
-            [&[event(Change::Start)], before, &[event(Change::Count(settling_s))], parts].concat()
-        };
-        let held = |parts: &[Part]| counted(&[], 0.5, parts);
-        let regulated = |parts: &[Part]| counted(&[at(rpm, ramp_s + 1.5)], 0.0, parts);
-        let caught =
-            [event(Change::FlyingStart(rpm)), event(Change::Count(0.1)), at(sign * CAUGHT_A, 0.7)];
-        let parts = match case.kind {
-            RangeKind::All | RangeKind::Constant | RangeKind::WrongParameters => {
-                held(&[at(i_q, 3.5)])
-            }
-            RangeKind::Reversals => {
-                let step = sign * STEP_A.min(most);
-                held(&[step, -step, step, 0.0, -step].map(|a| at(a, 0.6)))
-            }
-            RangeKind::LoadSteps => {
-                let nm = sign * LOAD_NM;
-                let loaded = |nm| Part { load_nm: config.newton_metres(nm), ..at(rpm, 1.0) };
-                regulated(&[nm, 0.0, -nm, 0.0].map(loaded))
-            }
-            RangeKind::Ramps | RangeKind::HotRamps => {
-                // Through zero and back, with or without warming of the motor on the way.
-                let warming = Part::unchanged(Change::Warming(RISE.0, RISE.1), WARMING_S);
-                let warms = (case.kind == RangeKind::HotRamps).then_some(warming);
-                let back = [at(-rpm, 2.0 * ramp_s + 0.7), at(0.0, ramp_s + 1.0)];
-                counted(&[], 0.0, &[&[at(rpm, ramp_s + 0.7)], warms.as_slice(), &back].concat())
-            }
-            RangeKind::TurnedFlux => {
-                let change = Change::Flux(turn_deg);
-                held(&[at(i_q, 1.0), Part { change, ..at(i_q, 3.0) }])
-            }
-            RangeKind::TurningStart => caught.to_vec(),
-            RangeKind::ResidualStart => {
-                [&[event(Change::Start), event(Change::Coast(off_s))], &caught[..]].concat()
-            }
-            RangeKind::Braking => regulated(&[event(Change::Brake)]),
-            RangeKind::Outage => {
-                let mains = |volts, s| Part { change: Change::Mains(volts), ..at(rpm, s) };
-                regulated(&[mains(0.0, OUTAGE_S), mains(config.inverter.dc_link_v, 2.0)])
-            }
-            RangeKind::Sag => {
-                // The voltage of a stiff dc link falls and returns under torque.
-                let sag = |from, to| Part::unchanged(Change::DcLink(Ramp(from, to)), SAG_RAMP_S);
-                let low = Part::unchanged(Change::Nothing, SAG_S);
-                held(&[at(i_q, 1.0), sag(1.0, SAG), low, sag(SAG, 1.0), low])
-            }
-        };
-        Self { rpm, i_q, parts }
-    }
+    let at = Part::constant;
+    let ramp_s = config.rpm(rpm.abs()) / f64::from(config.drive.ramp_rpm_per_s());
+    let (held, free) = (Shaft::Held(rpm), Shaft::Free);
+    let torque = |parts: &[Part]| Course::from_rest(held, &[], 0.5, parts);
+    let speed = |parts: &[Part]| Course::from_rest(free, &[at(rpm, ramp_s + 1.5)], 0.0, parts);
+    let [start, coast, catch, count] =
+        [Change::Start, Change::Coast(off_s), Change::FlyingStart(rpm), Change::Count(0.1)]
+            .map(Part::event);
+    let caught = at(sign * CAUGHT_A, 0.7);
+    let course = match case.kind {
+        RangeKind::All | RangeKind::Constant | RangeKind::WrongParameters => {
+            torque(&[at(i_q, 3.5)])
+        }
+        RangeKind::Reversals => {
+            let step = sign * STEP_A.min(most);
+            torque(&[step, -step, step, 0.0, -step].map(|a| at(a, 0.6)))
+        }
+        RangeKind::LoadSteps => {
+            let nm = sign * LOAD_NM;
+            let loaded = |nm| Part { load_nm: config.newton_metres(nm), ..at(rpm, 1.0) };
+            speed(&[nm, 0.0, -nm, 0.0].map(loaded))
+        }
+        RangeKind::Ramps | RangeKind::HotRamps => {
+            // Through zero and back, with or without warming of the motor on the way.
+            let warming = Part::unchanged(Change::Warming(RISE.0, RISE.1), WARMING_S);
+            let warms = (case.kind == RangeKind::HotRamps).then_some(warming);
+            let back = [at(-rpm, 2.0 * ramp_s + 0.7), at(0.0, ramp_s + 1.0)];
+            let parts = [&[at(rpm, ramp_s + 0.7)], warms.as_slice(), &back].concat();
+            Course::from_rest(free, &[], 0.0, &parts)
+        }
+        RangeKind::TurnedFlux => {
+            let change = Change::Flux(turn_deg);
+            torque(&[at(i_q, 1.0), Part { change, ..at(i_q, 3.0) }])
+        }
+        RangeKind::TurningStart => Course { shaft: held, parts: vec![catch, count, caught] },
+        RangeKind::ResidualStart => {
+            Course { shaft: held, parts: vec![start, coast, catch, count, caught] }
+        }
+        RangeKind::Braking => speed(&[Part::event(Change::Brake)]),
+        RangeKind::Outage => {
+            let mains = |volts, s| Part { change: Change::Mains(volts), ..at(rpm, s) };
+            speed(&[mains(0.0, OUTAGE_S), mains(config.inverter.dc_link_v, 2.0)])
+        }
+        RangeKind::Sag => {
+            // The voltage of a stiff dc link falls and returns under torque.
+            let sag = |from, to| Part::unchanged(Change::DcLink(Ramp(from, to)), SAG_RAMP_S);
+            let low = Part::unchanged(Change::Nothing, SAG_S);
+            torque(&[at(i_q, 1.0), sag(1.0, SAG), low, sag(SAG, 1.0), low])
+        }
+    };
+    (rpm, i_q, course)
 }
 
 /// Does a run with a copy of a drive that is off; with `traced` it also returns the curves.
@@ -133,12 +124,12 @@ pub fn trial(
     seed: u64,
     traced: bool,
 ) -> Result<(Trial, Vec<Point>), Error> {
-    let Drawn { rpm, i_q, parts } = Drawn::of(case, config, seed);
-    let mut bench = Bench::new(config, drive, case.shaft(rpm), seed)?;
+    let (rpm, i_q, course) = drawn(case, config, seed);
+    let mut bench = Bench::new(config, drive, course.shaft, seed)?;
     bench.trial = Trial { case: case.name(), rpm, i_q, ..bench.trial };
     bench.wrong_deg = LOST_DEG;
     bench.rig.trace = traced.then(Vec::new);
-    bench.follow(&parts)?;
+    bench.follow(&course.parts)?;
     let is_constant = matches!(case.kind, RangeKind::Constant | RangeKind::WrongParameters);
     if is_constant && !bench.has_ended {
         let taken = f64::from(bench.rig.drive.telemetry().reference.q);

@@ -193,6 +193,9 @@ pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<Trial, Error
     Ok(Trial { case, rpm_per_s, late_s, fault: rig.drive.state().fault(), ..Trial::default() })
 }
 
+/// Longest relock, s.
+const LONGEST_RELOCK_S: f64 = 30.0;
+
 /// Starts a drive, or relocks a running one, at `rpm`.
 ///
 /// # Errors
@@ -207,9 +210,7 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Trial
         if rig.command(&Command::Relock).is_err() {
             return Ok(result);
         }
-        while !matches!(rig.drive.state(), State::Torque | State::Fault(_)) {
-            rig.step();
-        }
+        rig.wait_until(LONGEST_RELOCK_S, |state| state.regulates() || state.is_off());
         rig
     } else {
         let mut config = config.clone();

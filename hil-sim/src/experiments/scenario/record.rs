@@ -27,9 +27,6 @@ pub struct Record {
     reference: &'static Reference,
     /// Beginnings of the parts, s.
     begun: Vec<f64>,
-    /// The reference over time: its corners, or the values of a profile in rows.
-    wanted: Vec<(f64, f64)>,
-    events: Vec<(f64, String)>,
     /// The first reference that the drive has limited: its time, s, its value, and the limited value.
     pub limited: Option<(f64, f64, f32)>,
     /// The fault with which the drive has stopped itself.
@@ -56,38 +53,21 @@ impl Scenario {
             parts,
             reference,
             begun: Vec::new(),
-            wanted: Vec::new(),
-            events: Vec::new(),
             limited: None,
             fault: None,
         };
-        let mut acting = 0.0;
         for block in 0..blocks {
             let t = block as f64 * PACE_S;
             while let Some(part) =
                 record.parts.get(record.begun.len()).filter(|p| p.begin <= t + DUST_S)
             {
-                let begin = rig.time() - start;
-                record.begun.push(begin);
+                record.begun.push(rig.time() - start);
                 if let Some(stop) = part.stop {
                     rig.command(&Command::Stop(stop))?;
                 }
                 if part.start {
                     rig.command(&Command::Start(reference.mode))?;
                 }
-                if self.from_rows {
-                    continue;
-                }
-                let (from, to) = (part.reference.0, part.reference.1);
-                record.wanted.extend([(begin, from), (begin + part.seconds, to)]);
-                if self.shaft == Shaft::Free && part.load.0 != acting {
-                    let text = match part.load.0 {
-                        0.0 => "load off".to_owned(),
-                        torque => format!("load {torque:.2} Nm"),
-                    };
-                    record.events.push((begin, text));
-                }
-                acting = part.load.1;
             }
             let part = record.parts[record.begun.len() - 1];
             let value = part.at(part.reference, t);
@@ -100,9 +80,6 @@ impl Scenario {
             }
             if let Some(load) = self.load(&part, t) {
                 rig.set_load(load)?;
-            }
-            if self.from_rows {
-                record.wanted.push((t, value));
             }
             rig.run(PACE_S, |p| {
                 let (t, turns) = (p.t - start, p.turns - origin);
@@ -243,7 +220,7 @@ impl Record {
             let axes = axes(panel.label.as_deref().unwrap_or(label));
             figure = figure.panel(panel.lines.iter().fold(axes, |axes, line| {
                 let points = match line.of.0.name {
-                    "reference" | "reference_deg" => self.wanted(line.of.0, samples),
+                    "reference" | "reference_deg" => self.wanted(scenario, line.of.0, samples),
                     _ => self.line(line.of.0, samples),
                 };
                 let draw = if line.dashed { Series::reference } else { Series::line };
@@ -256,17 +233,42 @@ impl Record {
         figure.events(self.events(scenario))
     }
 
-    /// Returns the reference over time; beside single samples it ends with the last of them.
-    fn wanted(&self, of: &Quantity, samples: usize) -> Vec<(f64, f64)> {
+    /// Returns the parts that have begun, with their beginnings, s.
+    fn begun(&self) -> impl Iterator<Item = (&Part, f64)> {
+        self.parts.iter().zip(self.begun.iter().copied())
+    }
+
+    /// Returns the reference over time: its corners, or the values of a profile in rows. Beside single samples it ends
+    /// with the last of them.
+    fn wanted(&self, scenario: &Scenario, of: &Quantity, samples: usize) -> Vec<(f64, f64)> {
+        let wanted: Vec<(f64, f64)> = if scenario.from_rows {
+            let values = self.references.iter().step_by(CARRIER_SAMPLES);
+            (0..).map(|block| f64::from(block) * PACE_S).zip(values.copied()).collect()
+        } else {
+            let corners = |(part, begin): (&Part, f64)| {
+                [(begin, part.reference.0), (begin + part.seconds, part.reference.1)]
+            };
+            self.begun().flat_map(corners).collect()
+        };
         let end = if samples == 1 { self.end() } else { f64::INFINITY };
         let value =
             |reference| (of.of)(&Seen { point: &Point::default(), reference, actual: f64::NAN });
-        self.wanted.iter().map(|&(t, reference)| (t.min(end), value(reference))).collect()
+        wanted.into_iter().map(|(t, reference)| (t.min(end), value(reference))).collect()
     }
 
     /// Returns changes of the load, steps of the q-axis current, and finally a fault.
     fn events(&self, scenario: &Scenario) -> Vec<(f64, String)> {
-        let mut events = self.events.clone();
+        let (mut events, mut acting) = (Vec::new(), 0.0);
+        if scenario.shaft == Shaft::Free && !scenario.from_rows {
+            for (part, begin) in self.begun() {
+                match part.load.0 {
+                    torque if torque == acting => {}
+                    0.0 => events.push((begin, "load off".to_owned())),
+                    torque => events.push((begin, format!("load {torque:.2} Nm"))),
+                }
+                acting = part.load.1;
+            }
+        }
         if self.reference.mode == Mode::Torque && !scenario.from_rows {
             let steps =
                 self.parts.windows(2).filter(|two| two[0].reference.1 != two[1].reference.0);

@@ -56,14 +56,15 @@ impl Rise {
             let mut rig = rig.clone();
             rig.wait(wait as f64 / RATE_HZ);
             rig.command(&Command::Torque(i_q as f32))?;
+            rig.peak_a = peak_a;
             for current in &mut currents {
-                peak_a = rig.plant.phase_currents().into_iter().fold(peak_a, |a, i| a.max(i.abs()));
                 rig.run(1.0 / RATE_HZ, |point| {
                     let true_current = point.torque / (point.torque_per_flux_ampere * point.flux);
                     *current += true_current / CARRIER_SAMPLES as f64;
                     angle_deg = angle_deg.max(point.angle_error_deg.abs());
                 });
             }
+            peak_a = rig.peak_a;
             if let Some(fault) = rig.fault() {
                 return Err(Error::Refused(format!("the drive stops at a torque step: {fault}")));
             }
