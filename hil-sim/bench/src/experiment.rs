@@ -96,6 +96,12 @@ impl Experiment {
 /// repeats every 180°, has the wrong sign.
 pub const LOST_DEG: f64 = 45.0;
 
+/// Whether a run has lost the lock: its largest angle error, degrees, is beyond [`LOST_DEG`], or the drive has stopped
+/// itself.
+pub fn is_lost(largest_deg: f64, has_stopped: bool) -> bool {
+    has_stopped || largest_deg > LOST_DEG
+}
+
 /// Returns the assumptions of the simulated plant, for the remarks of an outcome.
 pub fn assumptions(config: &Config) -> Vec<String> {
     let (s, motor) = (plant_settings(config).saliency, config.motor_text());

@@ -15,7 +15,7 @@ pub use crate::config::{
     Config, LoadMode, PlantModel, built, check_model, open_phase, plant_settings,
 };
 pub use crate::error::Error;
-pub use crate::experiment::{Context, Experiment, LOST_DEG, assumptions};
+pub use crate::experiment::{Context, Experiment, LOST_DEG, assumptions, is_lost};
 pub use crate::outcome::{Cell, Column, Compared, Figure, Metrics, Outcome, Panel, Series, Table};
 pub use crate::plant::{Load, Plant};
 pub use crate::progress::Progress;

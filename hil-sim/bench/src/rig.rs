@@ -208,13 +208,9 @@ impl Rig {
         if self.trace.is_some() {
             self.point();
         } else {
-            self.period();
+            let sample = self.plant.sample();
+            self.step_with(&sample);
         }
-    }
-
-    fn period(&mut self) {
-        let sample = self.plant.sample();
-        self.step_with(&sample);
     }
 
     /// Runs one PWM period in which the drive gets `sample` instead of the sample of the plant. This is all that the
@@ -282,7 +278,8 @@ impl Rig {
             turns: plant.mechanical_angle() / TAU,
             ..Point::default()
         };
-        self.period();
+        let sample = self.plant.sample();
+        self.step_with(&sample);
         point.regulates = self.drive.state().regulates();
         let telemetry = self.drive.telemetry();
         let rpm = |step: f32| f64::from(step) * RATE_HZ * 60.0 / self.plant.pole_pairs();

@@ -100,6 +100,6 @@ pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<Steady
     rig.settle(&Command::Torque(case.iq as f32), 1.0)?;
     let [error, torque] = rig.stats(seconds, |p| [p.angle_error_deg, p.torque]);
     let fault = rig.drive.state().fault();
-    let lost = error.largest() > LOST_DEG || fault.is_some();
+    let lost = is_lost(error.largest(), fault.is_some());
     Ok(SteadyRun { case, error, torque: torque.mean(), lost, fault })
 }

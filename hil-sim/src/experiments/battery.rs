@@ -6,7 +6,6 @@
 //! flux is below half or above twice its nominal value for as long. It is *silent* (undetected) if it is wrong or its
 //! flux is off.
 
-mod bench;
 pub(super) mod disturbed;
 mod kind;
 mod run;
@@ -15,11 +14,10 @@ mod trial;
 
 use std::sync::OnceLock;
 
-pub use bench::Bench;
-pub use kind::{KINDS, Kind, allowed_a, nominal_limit_a, torque_limit_a, torque_nm};
+pub use kind::{KINDS, Kind};
 pub use run::{learned_drive, trial};
 pub use summary::Summary;
-pub use trial::{Refused, Trial};
+pub use trial::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
 
 use crate::prelude::*;
 

@@ -1,5 +1,9 @@
 //! A run over time: the shaft, the parts one after the other, and what changes in them. The bench of the stress test runs it.
 
+mod bench;
+
+pub use bench::Bench;
+
 /// A value at the beginning and at the end of a part, with a straight line between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ramp(pub f64, pub f64);
@@ -40,7 +44,7 @@ pub enum Change {
 }
 
 /// A part of a run. Currents and speeds are for the dissertation's motor; on others they are in proportion, q-axis
-/// currents to the [nominal limit](super::battery::nominal_limit_a).
+/// currents to the [nominal limit](super::torque_limit::nominal_limit_a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
     /// q-axis current, A, or speed, rpm. None: unchanged.

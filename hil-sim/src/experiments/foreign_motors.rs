@@ -7,10 +7,11 @@ use std::f64::consts::{SQRT_2, TAU};
 use drive_commission::Refusal;
 use drive_settings::{Flux, SettingsError};
 
-use super::battery::{Kind, Refused, Summary, Trial, allowed_a, disturbed, nominal_limit_a, trial};
+use super::battery::{Kind, Refused, Summary, Trial, disturbed, trial};
 use super::commission::{Outside, Session, unaware};
 use super::drawn_machine::Circuit;
 use super::saliency::Probe;
+use super::torque_limit::{allowed_a, nominal_limit_a};
 use crate::config::plate::rated;
 use crate::prelude::*;
 use crate::stats::exact;

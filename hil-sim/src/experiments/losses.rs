@@ -1,6 +1,6 @@
 //! Copper loss of the motor against the minimum for its torque, with and without `flux.minimise_loss`.
 
-use super::battery::Bench;
+use super::course::Bench;
 use super::full_range::for_the_range;
 use super::torque_limit::learned_limit;
 use crate::plant::MachineSettings;

@@ -1,6 +1,6 @@
 //! The largest torque over speed and dc-link voltage, motoring and generating, as the drive gives it.
 
-use super::battery::Bench;
+use super::course::Bench;
 use super::full_range::{I_D_A, for_the_range};
 use super::torque_limit::{BEYOND_A, TorqueLimit, learned_limit};
 use crate::prelude::*;

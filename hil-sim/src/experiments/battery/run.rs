@@ -1,10 +1,10 @@
 //! One run of the stress test.
 
 use super::Learnt;
-use super::bench::Bench;
-use super::kind::{Kind, allowed_a, nominal_limit_a};
+use super::kind::Kind;
 use super::trial::Trial;
-use crate::experiments::course::{Course, Shaft};
+use crate::experiments::course::{Bench, Course, Shaft};
+use crate::experiments::torque_limit::{allowed_a, nominal_limit_a};
 use crate::prelude::*;
 
 /// Longest saliency self-commissioning, s.
@@ -55,9 +55,9 @@ pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Tr
 #[cfg(test)]
 mod tests {
     use super::super::disturbed::Asymmetry;
-    use super::super::kind::torque_nm;
     use super::*;
     use crate::experiments::course::Change;
+    use crate::experiments::torque_limit::torque_nm;
 
     /// A lower limit is visible in every run, and the torque is judged by the accepted command. With 0.5 A for any
     /// command the error stays that of a healthy drive, a few per cent of the torque at the limit.

@@ -61,7 +61,7 @@ pub struct Trial {
     pub dc_link_v: (f64, f64),
     /// Time until a flying start found the flux, or a stop had ended, s.
     pub took_s: Option<f64>,
-    /// q-axis current that the drive allows, relative to the [nominal limit](super::nominal_limit_a).
+    /// q-axis current that the drive allows, relative to the [nominal limit](crate::experiments::torque_limit::nominal_limit_a).
     pub limit_share: Option<f64>,
     /// Mean torque of the motor minus the torque of the q-axis current that the drive accepted, in the direction of
     /// that current and relative to the torque at the nominal limit; only for a run at constant torque that reached its
@@ -69,6 +69,8 @@ pub struct Trial {
     pub torque_error: Option<f64>,
     /// Number of the fault that stopped the drive while it regulated.
     pub trip: Option<u8>,
+    /// Whether the course rotates the flux: then a stop is no failure.
+    pub turns_flux: bool,
     /// Whether angle and flux were right from the first reference until the stop.
     pub sound_stop: bool,
     /// Reason why the run has not begun.
@@ -91,7 +93,12 @@ impl Trial {
 
     /// Whether the error exceeded 45° while the drive regulated.
     pub fn is_lost(&self) -> bool {
-        self.largest_deg > LOST_DEG
+        is_lost(self.largest_deg, false)
+    }
+
+    /// Whether the error exceeded 45°, or the drive stopped although its flux was not rotated.
+    pub fn is_lost_or_stopped(&self) -> bool {
+        is_lost(self.largest_deg, self.trip.is_some() && !self.turns_flux)
     }
 
     /// Whether the angle was wrong for so long that the drive should have detected it.
@@ -120,7 +127,7 @@ impl Trial {
             let fault = Fault::ALL.iter().copied().find(|fault| fault.code() == code);
             fault.map_or_else(|| format!("fault {code}"), fault_text)
         };
-        let stops = self.trip.filter(|_| !self.kind.is_some_and(Kind::turns_flux));
+        let stops = self.trip.filter(|_| !self.turns_flux);
         let reasons = [
             self.refused_by().map(|code| format!("start refused with {}", fault(code))),
             self.is_wrong().then(|| format!("angle wrong for {:.2} s", self.wrong_s)),
@@ -134,5 +141,23 @@ impl Trial {
         }
         let kind = self.kind.map(Kind::name).unwrap_or_default();
         Some(format!("{kind}, seed {}: {reason}", self.seed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive that stops after its flux was rotated has done its work; an angle error beyond 45° is lost in any course.
+    #[test]
+    fn a_stop_after_a_rotation_of_the_flux_is_no_failure() {
+        let of = |largest_deg, trip, turns_flux| {
+            let trial = Trial { largest_deg, trip, turns_flux, ..Trial::default() };
+            (trial.is_lost(), trial.is_lost_or_stopped(), trial.failure().is_some())
+        };
+        assert_eq!(of(5.0, Some(13), true), (false, false, false));
+        assert_eq!(of(5.0, Some(13), false), (false, true, true));
+        assert_eq!(of(46.0, None, true), (true, true, true));
+        assert_eq!(of(45.0, None, false), (false, false, false));
     }
 }

@@ -1,38 +1,28 @@
 //! The verdict on the runs, for each kind and region.
 
 use super::case::Case;
-use crate::experiments::battery::{Refused, Trial};
+use crate::experiments::battery::{Refused, Summary, Trial};
 use crate::prelude::*;
-
-/// Whether a run was lost: stopped by a fault, or beyond 45°. After a rotation of the flux neither counts.
-fn is_lost(case: &Case, run: &Trial) -> bool {
-    run.trip.is_some() && case.kind != RangeKind::TurnedFlux || run.is_lost()
-}
 
 /// A run with its case and number.
 pub type Done = (Case, usize, Trial);
 
-/// Counts the runs with a property.
-fn count(done: &[&Done], is: impl Fn(&Case, &Trial) -> bool) -> f64 {
-    done.iter().filter(|(case, _, run)| is(case, run)).count() as f64
-}
-
 /// The verdict on some runs: names in the metrics, heads of the columns, numbers, and decimals if they are not counts.
-fn verdict(done: &[&Done]) -> Vec<(&'static str, &'static str, f64, Option<usize>)> {
-    let started = || done.iter().map(|(_, _, run)| run).filter(|run| run.refused.is_none());
-    let mut error = Stats::default();
-    started().for_each(|run| error.add(&run.error));
+fn verdict(runs: &[&Trial]) -> Vec<(&'static str, &'static str, f64, Option<usize>)> {
+    let started = || runs.iter().copied().filter(|run| run.refused.is_none());
+    let (all, error) = (Summary::of(runs.iter().copied()), Summary::of(started()).error());
+    let count = |is: fn(&Trial) -> bool| all.count(is) as f64;
     // Not a number if no run has started.
     let largest = |of: fn(&Trial) -> f64| started().map(of).fold(f64::NAN, f64::max);
     let least_v = started().map(|run| run.dc_link_v.0).fold(f64::NAN, f64::min);
     let largest_deg = if error.count() > 0 { error.largest() } else { f64::NAN };
     let took_s = started().filter_map(|run| run.took_s).reduce(f64::max);
     vec![
-        ("runs", "runs", done.len() as f64, None),
-        ("lost_runs", "lost", count(done, is_lost), None),
-        ("refused_runs", "refused", count(done, |_, run| run.refused.is_some()), None),
-        ("stopped_runs", "stopped", count(done, |_, run| run.trip.is_some()), None),
-        ("silent_runs", "silent", count(done, |_, run| run.is_wrong()), None),
+        ("runs", "runs", runs.len() as f64, None),
+        ("lost_runs", "lost", count(Trial::is_lost_or_stopped), None),
+        ("refused_runs", "refused", count(|run| run.refused.is_some()), None),
+        ("stopped_runs", "stopped", count(|run| run.trip.is_some()), None),
+        ("silent_runs", "silent", count(Trial::is_wrong), None),
         ("angle_error_rms_deg", "rms (°)", error.rms(), Some(2)),
         ("angle_error_max_deg", "largest (°)", largest_deg, Some(2)),
         ("current_peak_a", "current (A)", largest(|run| run.peak_a), Some(2)),
@@ -46,7 +36,8 @@ fn verdict(done: &[&Done]) -> Vec<(&'static str, &'static str, f64, Option<usize
 pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
     let mut table = Table::new("By kind and region", &[]);
     for case in cases {
-        let some: Vec<_> = done.iter().filter(|(of, _, _)| of == case).collect();
+        let of_case = done.iter().filter(|(of, _, _)| of == case);
+        let some: Vec<&Trial> = of_case.map(|(_, _, run)| run).collect();
         if some.is_empty() {
             continue;
         }
@@ -56,7 +47,7 @@ pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
                 outcome.metrics.set(format!("{}_{name}", case.name()), *value);
             }
         }
-        let torque = Stats::of(some.iter().filter_map(|(_, _, run)| run.torque_error));
+        let torque = Stats::of(some.iter().filter_map(|run| run.torque_error));
         if torque.count() > 0 {
             let name = format!("{}_torque_error_mean_pct", case.name());
             outcome.metrics.set(name, 100.0 * torque.mean());
@@ -70,12 +61,11 @@ pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
         let cells = verdict.into_iter().map(|(_, head, value, digits)| (head, cell(value, digits)));
         table.record([("kind", Cell::from(case.words()))].into_iter().chain(cells));
     }
-    let all: Vec<_> = done.iter().collect();
-    let m = &mut outcome.metrics;
-    m.set("runs", all.len() as f64);
-    m.set("lost_runs", count(&all, is_lost));
-    m.set("refused_runs", count(&all, |_, run| run.refused.is_some()));
-    m.set("silent_runs", count(&all, |_, run| run.is_wrong()));
+    let (all, m) = (Summary::of(done.iter().map(|(_, _, run)| run)), &mut outcome.metrics);
+    m.set("runs", done.len() as f64);
+    m.set("lost_runs", all.count(Trial::is_lost_or_stopped) as f64);
+    m.set("refused_runs", all.count(|run| run.refused.is_some()) as f64);
+    m.set("silent_runs", all.count(Trial::is_wrong) as f64);
     outcome.tables.push(table);
     outcome.faults.extend(done.iter().filter_map(|(case, number, run)| {
         let reason = failure(case, run)?;
@@ -103,7 +93,7 @@ fn failure(case: &Case, run: &Trial) -> Option<String> {
     }
     let reasons = [
         run.is_wrong().then(|| format!("beyond 45° for {:.2} s", run.wrong_s)),
-        is_lost(case, run).then(|| match run.trip {
+        run.is_lost_or_stopped().then(|| match run.trip {
             Some(fault) => format!("fault {fault}, largest error {:.0}°", run.largest_deg),
             None => format!("largest error {:.0}°", run.largest_deg),
         }),

@@ -217,13 +217,10 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Trial
         config.load.mode = LoadMode::Speed;
         config.load.speed_rpm = rpm;
         let mut rig = Rig::from_config(&config, seed)?;
-        let started = rig.start(Mode::Torque);
-        if rig.fault().is_none() {
-            started?;
-        }
+        rig.begin(Mode::Torque)?;
         rig
     };
-    if rig.fault().is_none() {
+    if rig.drive.state().regulates() {
         rig.run(0.5, |p| result.largest_deg = result.largest_deg.max(p.angle_error_deg.abs()));
         // A drive that stops itself within this time has not accepted the start.
         result.accepted = rig.fault().is_none();

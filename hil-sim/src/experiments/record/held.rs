@@ -41,7 +41,7 @@ pub struct Held {
 impl Held {
     /// Whether the angle was lost or the drive stopped.
     pub fn is_lost(&self) -> bool {
-        self.fault.is_some() || self.error.largest() > LOST_DEG
+        is_lost(self.error.largest(), self.fault.is_some())
     }
 
     /// Difference between the means of the last and the first minute, or tenth, degrees.

@@ -1,8 +1,8 @@
 //! A drive and a plant in a run, with the quantities that are observed.
 
-use super::kind::{nominal_limit_a, share_of_limit, torque_nm};
-use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
-use crate::experiments::course::{Change, Part, Shaft};
+use super::{Change, Part, Shaft};
+use crate::experiments::battery::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
+use crate::experiments::torque_limit::{nominal_limit_a, share_of_limit, torque_nm};
 use crate::prelude::*;
 
 /// Error beyond which the angle is wrong, degrees, unless the run sets another limit.
@@ -162,6 +162,8 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// If the plant refuses a change, or the drive a reference.
     pub fn follow(&mut self, parts: &[Part]) -> Result<(), Error> {
+        let turns = |part: &Part| matches!(part.change, Change::Flux(_));
+        self.trial.turns_flux |= parts.iter().any(turns);
         for part in parts {
             if self.shaft == Shaft::Free {
                 self.rig.set_load(Load::Free { torque: part.load_nm })?;
