@@ -10,15 +10,14 @@ pub(super) mod disturbed;
 mod kind;
 mod run;
 mod summary;
-mod trial;
 
 use std::sync::OnceLock;
 
 pub use kind::{KINDS, Kind};
 pub use run::{learned_drive, trial};
 pub use summary::Summary;
-pub use trial::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
 
+use super::course::Trial;
 use crate::prelude::*;
 
 /// Number of runs after which the drive repeats the saliency self-commissioning.

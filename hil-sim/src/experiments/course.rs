@@ -1,8 +1,10 @@
 //! A run over time: the shaft, the parts one after the other, and what changes in them. The bench of the stress test runs it.
 
 mod bench;
+mod trial;
 
 pub use bench::Bench;
+pub use trial::{CLASSES_PER_DEG, Refused, Trial, UNNOTICED_S};
 
 /// A value at the beginning and at the end of a part, with a straight line between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

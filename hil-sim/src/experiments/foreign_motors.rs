@@ -7,8 +7,9 @@ use std::f64::consts::{SQRT_2, TAU};
 use drive_commission::Refusal;
 use drive_settings::{Flux, SettingsError};
 
-use super::battery::{Kind, Refused, Summary, Trial, disturbed, trial};
+use super::battery::{Kind, Summary, disturbed, trial};
 use super::commission::{Outside, Session, unaware};
+use super::course::{Refused, Trial};
 use super::drawn_machine::Circuit;
 use super::saliency::Probe;
 use super::torque_limit::{allowed_a, nominal_limit_a};
@@ -72,7 +73,7 @@ pub struct Record {
     runs: [Vec<Trial>; 2],
 }
 
-/// Makes a refusal as [`course`] returns it.
+/// Makes a refusal as [`qualify`] returns it.
 fn refused(stage: &str, why: impl ToString, named: bool) -> Result<Option<Refusing>, Error> {
     Ok(Some(Refusing { stage: stage.to_owned(), why: why.to_string(), named }))
 }
@@ -141,7 +142,7 @@ fn some<'a>(from: &[&'a Record], is: fn(&Record) -> bool) -> Vec<&'a Record> {
 }
 
 /// Runs a motor from the nameplate to the last run; returns the refusal that ended it.
-fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<Refusing>, Error> {
+fn qualify(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<Refusing>, Error> {
     if let Err(error) = config.drive.build() {
         return refused(if by_plate(&error) { "nameplate" } else { "settings" }, error, true);
     }
@@ -245,7 +246,7 @@ impl Study for ForeignMotors {
         let (mut config, seed) = (self.drawn(number), seed_of(self.seed, number));
         let hertz = f64::from(config.drive.nameplate.frequency_hz);
         let mut record = Record { hertz, ..Record::default() };
-        record.refused = course(&mut config, seed, &mut record)?;
+        record.refused = qualify(&mut config, seed, &mut record)?;
         Ok(record)
     }
 

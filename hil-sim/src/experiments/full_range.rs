@@ -13,8 +13,9 @@ use std::sync::OnceLock;
 
 use case::Case;
 
-use super::battery::{Learnt, Trial, learned_drive, once};
+use super::battery::{Learnt, learned_drive, once};
 use super::commission::commissioned;
+use super::course::Trial;
 use crate::config::{FluxLevel, RangeKind};
 use crate::prelude::*;
 

@@ -14,15 +14,15 @@ const REVERSAL_RPM: f64 = 150.0;
 
 /// A test at the torque limit.
 #[derive(PartialEq)]
-struct Course {
+struct Test {
     key: &'static str,
     name: &'static str,
 }
 
-const STANDSTILL: Course = Course { key: "hold", name: "zero stator frequency" };
-const REVERSAL: Course = Course { key: "reversal", name: "reversal of the speed" };
+const STANDSTILL: Test = Test { key: "hold", name: "zero stator frequency" };
+const REVERSAL: Test = Test { key: "reversal", name: "reversal of the speed" };
 /// All tests, each with either sign.
-const COURSES: [(Course, f64); 4] =
+const TESTS: [(Test, f64); 4] =
     [(STANDSTILL, 1.0), (STANDSTILL, -1.0), (REVERSAL, 1.0), (REVERSAL, -1.0)];
 
 /// Runs the experiment, which is not in the source.
@@ -42,8 +42,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let torque = TorqueLimit::new(&config, allowed_a(&rig.drive, config.amperes(BEYOND_A))?)
         .at_most(config.record.torque_pct);
     let limit = torque.i_q;
-    let held = context.in_parallel("record", &COURSES, |_, (course, sign)| {
-        hold(&after, rig.clone(), course, sign * limit)
+    let held = context.in_parallel("record", &TESTS, |_, (test, sign)| {
+        hold(&after, rig.clone(), test, sign * limit)
     })?;
     let mut outcome = Outcome::default();
     let m = &mut outcome.metrics;
@@ -51,16 +51,16 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("limit_nm", torque.nm);
     m.set("torque_rated_nm", config.rated_nm());
     m.set("limit_pct_of_rated_torque", torque.percent);
-    for course in [STANDSTILL, REVERSAL] {
-        let of = || COURSES.iter().zip(&held).filter(|((known, _), _)| *known == course);
+    for test in [STANDSTILL, REVERSAL] {
+        let of = || TESTS.iter().zip(&held).filter(|((known, _), _)| *known == test);
         let worst = |value: &dyn Fn(&Held) -> f64| {
             of().map(|(_, held)| value(held).abs()).fold(0.0, f64::max)
         };
-        let key = course.key;
+        let key = test.key;
         m.set(format!("{key}_error_mean_deg"), worst(&|held| held.error.mean()));
         m.set(format!("{key}_error_rms_deg"), worst(&|held| held.error.rms()));
         m.set(format!("{key}_error_max_deg"), worst(&|held| held.error.largest()));
-        if course == STANDSTILL {
+        if test == STANDSTILL {
             m.set("hold_drift_deg", worst(&Held::drift_deg));
             m.set("hold_speed_rpm", worst(&|held| held.speed.mean()));
             m.set("hold_stator_hz", worst(&|held| held.stator_hz));
@@ -69,14 +69,14 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let lost = of().any(|(_, held)| held.is_lost());
         m.set(format!("{key}_lost"), f64::from(u8::from(lost)));
     }
-    for ((course, sign), held) in COURSES.iter().zip(&held) {
+    for ((test, sign), held) in TESTS.iter().zip(&held) {
         let why = held.fault.as_deref().or(held.is_lost().then_some("angle lost"));
-        let text = |why| format!("{} at {:+.2} Nm: {why}", course.name, torque.nm * sign);
+        let text = |why| format!("{} at {:+.2} Nm: {why}", test.name, torque.nm * sign);
         outcome.faults.extend(why.map(text));
     }
     outcome.tables.push(held_table(&held, &torque));
-    for course in [STANDSTILL, REVERSAL] {
-        outcome.figures.push(held_figure(&course, &held));
+    for test in [STANDSTILL, REVERSAL] {
+        outcome.figures.push(held_figure(&test, &held));
     }
     outcome.remarks = assumptions(&config);
     outcome.remarks.push(torque.text(&config));
@@ -84,8 +84,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 }
 
 /// Starts the drive, commands its torque, and watches.
-fn hold(config: &Config, mut rig: Rig, course: &Course, i_q: f64) -> Result<Held, Error> {
-    let reverses = *course == REVERSAL;
+fn hold(config: &Config, mut rig: Rig, test: &Test, i_q: f64) -> Result<Held, Error> {
+    let reverses = *test == REVERSAL;
     let rpm = if reverses { config.rpm(REVERSAL_RPM) } else { 0.0 };
     bring_up(&mut rig, rpm)?;
     if rig.fault().is_none() {
@@ -106,28 +106,28 @@ fn hold(config: &Config, mut rig: Rig, course: &Course, i_q: f64) -> Result<Held
 fn held_table(all: &[Held], torque: &TorqueLimit) -> Table {
     let degrees = |value: f64| Cell::fixed(value, 2);
     let columns = columns![|n, held: &Held|
-        "course" => Cell::from(COURSES[n].0.name);
-        "torque (Nm)" => Cell::fixed(COURSES[n].1 * torque.nm, 2);
-        "of rated (%)" => Cell::fixed(COURSES[n].1 * torque.percent, 0);
+        "course" => Cell::from(TESTS[n].0.name);
+        "torque (Nm)" => Cell::fixed(TESTS[n].1 * torque.nm, 2);
+        "of rated (%)" => Cell::fixed(TESTS[n].1 * torque.percent, 0);
         "mean error (°)" => degrees(held.error.mean());
         "first (°)" => degrees(held.first.mean());
         "last (°)" => degrees(held.last.mean());
         "rms (°)" => degrees(held.error.rms());
         "largest (°)" => degrees(held.error.largest());
         "torque of the command (%)" =>
-            Cell::fixed(100.0 * held.torque.mean() / (COURSES[n].1 * torque.nm), 2);
+            Cell::fixed(100.0 * held.torque.mean() / (TESTS[n].1 * torque.nm), 2);
         "speed (rpm)" => Cell::fixed(held.speed.mean(), 2);
         "end" => Cell::from(held.fault.as_deref().unwrap_or("regulates"));
     ];
     Table::of(texts::table("record", "held"), &columns, all.iter().enumerate())
 }
 
-fn held_figure(course: &Course, all: &[Held]) -> Figure {
+fn held_figure(test: &Test, all: &[Held]) -> Figure {
     let x = "time (s)";
     let labels = ["angle error (° electrical)", "torque (Nm)", "speed (rpm)"];
-    let mut figure = Figure::new(course.key, format!("The torque limit, {}", course.name), "");
+    let mut figure = Figure::new(test.key, format!("The torque limit, {}", test.name), "");
     for (n, label) in labels.into_iter().enumerate() {
-        let of = COURSES.iter().zip(all).filter(|((known, _), _)| known == course);
+        let of = TESTS.iter().zip(all).filter(|((known, _), _)| known == test);
         let panel = of.fold(Panel::new(x, label), |panel, ((_, sign), held)| {
             let name = format!("{:+.0} % of the limit", 100.0 * sign);
             panel.with(Series::line(name, held.lines[n].clone()))

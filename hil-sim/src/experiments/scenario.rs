@@ -158,14 +158,14 @@ impl Scenario {
     }
 
     /// Returns the parts for this total time in seconds, and the total time, s.
-    fn course(&self, seconds: Option<f64>) -> (Vec<Part>, f64) {
+    fn stretched(&self, seconds: Option<f64>) -> (Vec<Part>, f64) {
         let whole: f64 = self.parts.iter().map(|part| part.seconds).sum();
         let stretch = seconds.filter(|_| !self.from_rows).map_or(1.0, |seconds| seconds / whole);
-        let stretched = |part: &Part| {
+        let part = |part: &Part| {
             let (begin, seconds) = (part.begin * stretch, part.seconds * stretch);
             Part { begin, seconds, ..*part }
         };
-        (self.parts.iter().map(stretched).collect(), seconds.unwrap_or(whole))
+        (self.parts.iter().map(part).collect(), seconds.unwrap_or(whole))
     }
 
     /// Returns the value of a column in the unit of the drive.

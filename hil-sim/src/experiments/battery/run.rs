@@ -2,8 +2,7 @@
 
 use super::Learnt;
 use super::kind::Kind;
-use super::trial::Trial;
-use crate::experiments::course::{Bench, Course, Shaft};
+use crate::experiments::course::{Bench, Course, Shaft, Trial};
 use crate::experiments::torque_limit::{allowed_a, nominal_limit_a};
 use crate::prelude::*;
 

@@ -1,7 +1,7 @@
 //! The verdict on many runs of the stress test.
 
 use super::kind::Kind;
-use super::trial::{CLASSES_PER_DEG, Trial, UNNOTICED_S};
+use crate::experiments::course::{CLASSES_PER_DEG, Trial, UNNOTICED_S};
 use crate::prelude::*;
 
 /// A duration in a run, s, and the number of a fault.

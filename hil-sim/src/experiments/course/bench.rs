@@ -1,7 +1,7 @@
 //! A drive and a plant in a run, with the quantities that are observed.
 
+use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
 use super::{Change, Part, Shaft};
-use crate::experiments::battery::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
 use crate::experiments::torque_limit::{nominal_limit_a, share_of_limit, torque_nm};
 use crate::prelude::*;
 
@@ -22,6 +22,7 @@ const LONGEST_STOP_S: f64 = 60.0;
 /// Speed below which the shaft counts as stopped, rpm on four poles, and the time between two looks, s.
 const STOPPED_RPM: f64 = 30.0;
 const BRAKED_S: f64 = 0.02;
+
 /// Step time and acceleration of the dynamometer that brings a shaft up to speed, s and rpm/s, and the time after it, s.
 const PACE_S: f64 = 0.01;
 const RAMP_RPM_PER_S: f64 = 600.0;

@@ -1,7 +1,8 @@
 //! The verdict on the runs, for each kind and region.
 
 use super::case::Case;
-use crate::experiments::battery::{Refused, Summary, Trial};
+use crate::experiments::battery::Summary;
+use crate::experiments::course::{Refused, Trial};
 use crate::prelude::*;
 
 /// A run with its case and number.

@@ -1,8 +1,7 @@
 //! The course of a run, and its result.
 
 use super::case::Case;
-use crate::experiments::battery::Trial;
-use crate::experiments::course::{Bench, Change, Course, Part, Ramp, Shaft};
+use crate::experiments::course::{Bench, Change, Course, Part, Ramp, Shaft, Trial};
 use crate::experiments::torque_limit::nominal_limit_a;
 use crate::prelude::*;
 

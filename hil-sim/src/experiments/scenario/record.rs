@@ -40,7 +40,7 @@ impl Scenario {
     /// If the configuration is refused, or the drive refuses a command or does not start.
     pub fn record(&self, context: &Context<'_>) -> Result<Record, Error> {
         let reference = self.reference();
-        let (parts, seconds) = self.course(context.seconds);
+        let (parts, seconds) = self.stretched(context.seconds);
         let config = self.configured(context.config)?;
         let mut rig = Rig::started(&config, context.seed, reference.mode)?;
         let (start, origin) = (rig.time(), rig.plant.mechanical_angle() / TAU);

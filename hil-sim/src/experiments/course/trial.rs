@@ -1,6 +1,6 @@
-//! The result of a run of the stress test.
+//! The result of a course.
 
-use super::kind::Kind;
+use crate::experiments::battery::Kind;
 use crate::prelude::*;
 
 /// Duration, s, after which a state should have been detected.
