@@ -175,7 +175,7 @@ impl Bus {
         let stage = state.map(State::stage);
         let stopped = self.power == Power::QuickStopActive
             && stage == Some(Stage::Off)
-            && !settings.modules.bus.quick_stop.stays();
+            && !settings.modules.bus.quick_stop.reaction().1;
         let events = [
             (stage.is_some(), Event::Ready),
             (stage == Some(Stage::Fault), Event::Failed),
@@ -366,7 +366,7 @@ impl<D: DriveHandle> Access<'_, D> {
         let event = Event::of(word);
         match event {
             Event::DisableVoltage => self.stop(Stop::Now, event),
-            Event::QuickStop => self.stop(self.settings().quick_stop.stop(), event),
+            Event::QuickStop => self.stop(self.settings().quick_stop.reaction().0, event),
             Event::Shutdown => self.stop(Stop::Ramp, event),
             _ => self.enable(event),
         }
@@ -374,7 +374,7 @@ impl<D: DriveHandle> Access<'_, D> {
 
     /// Carries out *switch on* and *enable operation*, if the state has a transition for them.
     fn enable(&mut self, event: Event) -> Result<(), Exception> {
-        let stays = self.settings().quick_stop.stays();
+        let (_, stays) = self.settings().quick_stop.reaction();
         let power = match self.state() {
             // Without such an option code, a quick stop goes on to its end.
             Power::QuickStopActive if !stays => Power::QuickStopActive,

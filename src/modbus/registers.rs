@@ -153,7 +153,7 @@ pub static ROWS: [Row; 34] = rows! {
     0x603f: Word(|v| v.error_code()), "", "fault as in CiA 402: 0xFF00 plus its number, 0 for none";
     CONTROL: Word(|v| v.control_word()), "", "control word of CiA 402, see below";
     0x6041: Word(|v| v.status_word()), "", "status word of CiA 402, see below";
-    0x605a: Word(|v| v.quick_stop()), "", "quick stop option code of CiA 402: `bus.quick_stop`";
+    0x605a: Word(|v| v.settings.modules.bus.quick_stop.word().parse().unwrap_or(0)), "", "quick stop option code of CiA 402: `bus.quick_stop`";
     MODE: Word(|_| VELOCITY), "", "mode of operation of CiA 402: 2, velocity; other values are refused with exception 3";
     0x6061: Word(|v| v.mode()), "", "mode of operation in force: 1 position, 2 velocity, 4 torque, 0 another or none";
 };
@@ -278,11 +278,6 @@ impl View<'_> {
         self.status.map_or(0.0, |status| scales.ntc.celsius(status.sample.heat_sink))
     }
 
-    fn quick_stop(&self) -> u16 {
-        // Its words are numbers.
-        self.settings.modules.bus.quick_stop.word().parse().unwrap_or(0)
-    }
-
     fn mode(&self) -> u16 {
         match self.status.map(|status| status.state) {
             Some(State::Position) => 1,
@@ -363,11 +358,6 @@ impl Row {
             Shown::Word(value) => value(view),
             Shown::Double(value) => half(value(view), place),
         })
-    }
-
-    /// Whether the row can be written.
-    pub fn is_written(&self) -> bool {
-        matches!(self.at, COMMAND | FREQUENCY | RESET | STAGED | CONTROL | MODE)
     }
 
     /// Number of registers of the row.

@@ -108,18 +108,15 @@ words! {
 }
 
 impl QuickStop {
-    /// The stop of the drive.
-    pub fn stop(self) -> Stop {
+    /// The stop of the drive, and whether the state stays *quick stop active* at standstill.
+    pub fn reaction(self) -> (Stop, bool) {
         match self {
-            Self::Off => Stop::Now,
-            Self::Ramp | Self::RampStays => Stop::Ramp,
-            Self::Quick | Self::QuickStays => Stop::Quick,
+            Self::Off => (Stop::Now, false),
+            Self::Ramp => (Stop::Ramp, false),
+            Self::Quick => (Stop::Quick, false),
+            Self::RampStays => (Stop::Ramp, true),
+            Self::QuickStays => (Stop::Quick, true),
         }
-    }
-
-    /// Whether the state stays *quick stop active* at standstill.
-    pub fn stays(self) -> bool {
-        matches!(self, Self::RampStays | Self::QuickStays)
     }
 }
 

@@ -13,7 +13,7 @@ use drive_settings::SettingsError;
 use super::Frame;
 use super::bus::is_stop;
 use super::cia402::Power;
-use super::registers::{FAULTS, ROWS, Shown};
+use super::registers::{COMMAND, CONTROL, FAULTS, FREQUENCY, MODE, RESET, ROWS, STAGED, Shown};
 use super::settings::{Baud, Format};
 use super::slave::{self, Registers, Words};
 use crate::board::CLOCK_HZ;
@@ -291,7 +291,8 @@ fn rows() -> String {
             _ => row.unit.to_owned(),
         };
         let kind = if matches!(row.shown, Shown::Double(_)) { "32 bits" } else { "16 bits" };
-        let access = if row.is_written() { "read, write" } else { "read" };
+        let is_written = matches!(row.at, COMMAND | FREQUENCY | RESET | STAGED | CONTROL | MODE);
+        let access = if is_written { "read, write" } else { "read" };
         writeln!(text, "| `0x{:04X}` | {kind} | {unit} | {access} | {} |", row.at, row.help)
             .unwrap();
     }
