@@ -28,7 +28,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// List the most used experiments, with the figure or table that each reproduces
+    /// List the most used experiments, and what each is for
     List {
         /// The other experiments: figures and tables of the two sources, and special questions
         #[arg(long)]

@@ -123,7 +123,7 @@ fn lists_name_every_experiment_and_key() {
         let output = hil_sim(&folder, options);
         let list = text(&output.stdout);
         let heads = list.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_lowercase()));
-        heads.map(|line| line.split_once(' ').unwrap().0.to_owned()).collect::<Vec<_>>()
+        heads.map(|line| line.split(' ').next().unwrap().to_owned()).collect::<Vec<_>>()
     };
     let everyday = names(&["list"]);
     assert_eq!(everyday, *EVERYDAY);

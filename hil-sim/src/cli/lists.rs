@@ -22,10 +22,12 @@ pub fn experiments(as_json: bool, lab: bool) -> Result<String, Error> {
     shown.sort_by_key(place);
     let mut text = String::new();
     for Experiment { name, stands_for, about, .. } in shown {
-        text.push_str(&format!("{name:<20} {stands_for}\n{}\n\n", report::paragraph(about, 4)));
+        let source = if lab { format!(" ({stands_for})") } else { String::new() };
+        let about = report::paragraph(&format!("{about}{source}"), 4);
+        text.push_str(&format!("{name}\n{about}\n\n"));
     }
     if !lab {
-        text.push_str("    The others, most of them of the laboratory: `list --lab`.\n");
+        text.push_str("Run one with `cargo sim run NAME`. The others repeat figures and tables of the two sources: `list --lab`.\n");
     }
     Ok(text)
 }
@@ -122,7 +124,9 @@ fn motor_text(motor: &Motor) -> Result<String, Error> {
         table.row([key, &value, unit, why].map(Cell::from));
     }
     let Motor { name, title, about, .. } = motor;
-    let (about, table) = (about.trim(), report::table(&table));
+    let about = Some(about.trim()).filter(|about| !about.is_empty());
+    let about = about.map_or(String::new(), |about| format!("\n{}\n", report::paragraph(about, 0)));
+    let table = report::table(&table);
     let (m, carrier) = (config.drive.motor, config.drive.carrier_v());
     let (amperes, nm) =
         (config.drive.injection_a(), config.drive.injection_nm(&config.drive.reference()));
@@ -130,7 +134,7 @@ fn motor_text(motor: &Motor) -> Result<String, Error> {
     let (leakage, tau_r) = (1e3 * m.sigma_l_s(), 1e3 * m.tau_r());
     let lines = motor.console_lines().join("\n");
     Ok(format!(
-        "{name}: {title}\n\n{about}\n\n{table}\nLeakage inductance {leakage:.4} mH, rotor time constant {tau_r:.0} ms, \
+        "{name}: {title}\n{about}\n{table}Leakage inductance {leakage:.4} mH, rotor time constant {tau_r:.0} ms, \
          injected voltage {carrier:.1} V.\nTorque ripple of the injection at standstill: {nm:.3} Nm at 600 Hz, {percent:.0} % of the \
          rated torque, by a current of {amperes:.3} A.\n\nAt the console, with the scales of your board:\n{lines}\n"
     ))

@@ -1,5 +1,10 @@
 //! One experiment, or a group of them.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use signal_hook::consts::SIGINT;
 use trace::Voltages;
 
 use super::{say, used};
@@ -124,7 +129,8 @@ impl<'a> Run<'a> {
             return outcome.to_json(name, &origin).map_err(|e| Error::Internal(e.to_string()));
         }
         let Experiment { about, stands_for, .. } = self.experiment;
-        let mut text = format!("{name}: {about} ({stands_for})\n\n{}", report::text(outcome));
+        let head = report::paragraph(&format!("{name}: {about} ({stands_for})"), 0);
+        let mut text = format!("{head}\n\n{}", report::text(outcome));
         if let (Some(path), false) = (path, self.input.quiet) {
             text.push_str(&format!("\nReport: {}\n", path.display()));
         }
@@ -214,6 +220,7 @@ fn resumed(
     let all = (statistical.runs)(context)?;
     let header = Header::new(experiment.name, context.config, context.seed, all)?;
     let journal = Journal::open(path, &header)?;
+    say_on_interrupt(path, all)?;
     let path = message(path.display());
     // A torn line is reported even in quiet mode.
     if let Some(line) = journal.torn {
@@ -226,6 +233,29 @@ fn resumed(
     let records = journal::records(statistical, context, &journal)?;
     let outcome = (statistical.outcome)(context, records)?;
     Ok(experiment.remarked(outcome, context.config))
+}
+
+/// Makes Ctrl-C say how many runs are kept in the file, and end the process.
+///
+/// # Errors
+/// [`Error::Internal`] if the signal cannot be watched.
+fn say_on_interrupt(path: &Path, all: usize) -> Result<(), Error> {
+    let (stop, path) = (Arc::new(AtomicBool::new(false)), path.to_owned());
+    signal_hook::flag::register(SIGINT, stop.clone())
+        .map_err(|e| Error::Internal(e.to_string()))?;
+    std::thread::spawn(move || {
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        let stored = std::fs::read(&path).unwrap_or_default();
+        let kept = stored.iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1);
+        let path = message(path.display());
+        eprintln!(
+            "\ninterrupted: {kept} of {all} runs are kept in {path}; the same command continues"
+        );
+        std::process::exit(130)
+    });
+    Ok(())
 }
 
 /// Identifies the motor from a trace.

@@ -44,34 +44,54 @@ fn write_metrics(text: &mut String, metrics: &Metrics) {
     text.push('\n');
 }
 
-/// Returns a table with aligned columns, with its title above and its note below.
+/// Returns a table with aligned columns, with its title above and its note below. If the table is wider than 100 characters, the texts of its
+/// widest columns continue on further lines, where only a word longer than a third of that, such as a path, is broken.
 pub fn table(table: &Table) -> String {
     let (mut text, count) = (String::new(), table.columns.len());
-    let width = |column: usize| {
-        let cells = table.rows.iter().filter_map(|row| row.get(column)).map(Cell::text);
-        let head = table.columns[column].as_str();
-        cells.chain([head]).map(|cell| cell.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..count).map(width).collect();
     let right: Vec<bool> = (0..count).map(|column| table.is_numeric(column)).collect();
-    let line = |cells: Vec<&str>| {
-        let padded = cells.iter().enumerate().map(|(column, cell)| {
-            let width = widths.get(column).copied().unwrap_or(0);
-            match right.get(column) {
-                Some(true) => format!("{cell:>width$}"),
-                _ => format!("{cell:<width$}"),
-            }
+    let chars = |cell: &str| cell.chars().count();
+    let word = |cell: &str| cell.split(' ').map(chars).max().unwrap_or(0);
+    let longest = |column: usize, length: &dyn Fn(&str) -> usize| {
+        let cells = table.rows.iter().filter_map(|row| row.get(column));
+        cells.map(|cell| length(cell.text())).max().unwrap_or(0)
+    };
+    let cells: Vec<_> = (0..count).map(|column| longest(column, &chars)).collect();
+    let with_head = |column: usize, length: &dyn Fn(&str) -> usize| {
+        longest(column, length).max(length(&table.columns[column]))
+    };
+    let mut widths: Vec<_> = (0..count).map(|column| with_head(column, &chars)).collect();
+    let least: Vec<_> = (0..count).map(|column| with_head(column, &word).min(WIDTH / 3)).collect();
+    let gaps = 2 * count.saturating_sub(1);
+    while widths.iter().sum::<usize>() + gaps > WIDTH {
+        // Heads first, which are longer than what is below them.
+        let shrinks = (0..count).filter(|&column| widths[column] > least[column]);
+        let widest = shrinks.max_by_key(|&n| (widths[n] > cells[n], widths[n]));
+        let Some(widest) = widest else { break };
+        widths[widest] -= 1;
+    }
+    let row = |cells: Vec<&str>| {
+        let parts = cells
+            .iter()
+            .zip(&widths)
+            .map(|(cell, &width)| textwrap::wrap(cell, options(width).break_words(true)));
+        let parts: Vec<_> = parts.collect();
+        let height = parts.iter().map(Vec::len).max().unwrap_or(0);
+        let lines = (0..height).map(|line| {
+            let padded = parts.iter().zip(&widths).zip(&right).map(|((part, &width), right)| {
+                let part = part.get(line).map_or("", |part| part.trim_end());
+                if *right { format!("{part:>width$}") } else { format!("{part:<width$}") }
+            });
+            padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
         });
-        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+        lines.collect::<Vec<_>>().join("\n")
     };
     if !table.title.is_empty() {
         let _ = writeln!(text, "{}", table.title);
     }
-    let _ = writeln!(text, "{}", line(table.columns.iter().map(String::as_str).collect()));
-    let whole = widths.iter().sum::<usize>() + 2 * count.saturating_sub(1);
-    let _ = writeln!(text, "{}", "-".repeat(whole));
-    for row in &table.rows {
-        let _ = writeln!(text, "{}", line(row.iter().map(Cell::text).collect()));
+    let _ = writeln!(text, "{}", row(table.columns.iter().map(String::as_str).collect()));
+    let _ = writeln!(text, "{}", "-".repeat(widths.iter().sum::<usize>() + gaps));
+    for cells in &table.rows {
+        let _ = writeln!(text, "{}", row(cells.iter().map(Cell::text).collect()));
     }
     if !table.note.is_empty() {
         let _ = writeln!(text, "{}", wrap(&table.note, "", ""));
@@ -91,14 +111,31 @@ pub fn paragraph(text: &str, indent: usize) -> String {
 
 /// Breaks a paragraph into lines of at most 100 characters, each after one of the two indents.
 fn wrap(paragraph: &str, first: &str, others: &str) -> String {
-    let options = textwrap::Options::new(WIDTH).initial_indent(first).subsequent_indent(others);
-    let options = options.word_splitter(textwrap::WordSplitter::NoHyphenation).break_words(false);
+    let options = options(WIDTH).initial_indent(first).subsequent_indent(others);
     textwrap::fill(&paragraph.split_whitespace().collect::<Vec<_>>().join(" "), options)
+}
+
+/// Returns the options to break lines at `width` characters, between words alone.
+fn options(width: usize) -> textwrap::Options<'static> {
+    let options = textwrap::Options::new(width).break_words(false);
+    options.word_splitter(textwrap::WordSplitter::NoHyphenation)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_wide_table_continues_its_texts_on_further_lines() {
+        let mut wide = Table::new("", &["machines", "answer of the drive"]);
+        wide.row([Cell::fixed(50.0, 0), Cell::from("the shaft turns ".repeat(20).as_str())]);
+        let text = table(&wide);
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        assert_eq!(text.matches("the shaft turns").count() + text.matches("shaft\n").count(), 20);
+        assert_eq!(text.matches("50").count(), 1, "{text}");
+        wide.rows[0][1] = Cell::from("the shaft turns");
+        assert_eq!(table(&wide).lines().count(), 3);
+    }
 
     #[test]
     fn metrics_are_printed_beside_tables_and_without_any_nan() {
