@@ -1434,10 +1434,8 @@ def block_bias():
 
 BLOCKS = {
     "theory.md": {"theory-motor": block_motor, "theory-offset": block_offset, "theory-zeros": block_zeros, "theory-barrier": block_barrier, "theory-false": block_false, "theory-trip": block_trip},
-    "theory-observability.md": {"theory-voltage": block_voltage, "theory-resistance": block_resistance},
-    "theory-source.md": {"theory-impedance": block_impedance, "theory-leak": block_leak, "theory-direct": block_direct},
-    "theory-estimation.md": {"theory-chain": block_chain, "theory-filter": block_filter, "theory-alone": block_alone},
-    "theory-identification.md": {"theory-bias": block_bias},
+    "theory-estimation.md": {"theory-voltage": block_voltage, "theory-resistance": block_resistance, "theory-chain": block_chain, "theory-filter": block_filter, "theory-alone": block_alone},
+    "sources.md": {"theory-impedance": block_impedance, "theory-leak": block_leak, "theory-direct": block_direct, "theory-bias": block_bias},
 }
 
 NUMBERS = {}
@@ -1515,16 +1513,8 @@ def quotes():
             f"| current | {V_INJ / x:.2f} A peak",
             f"| torque ripple | {M.torque(I_D, V_INJ / x):.3f} Nm peak",
         ],
-        "theory-observability.md": [
-            f"with i_d = {I_D} A and i_q = 1 A is {dr:.3f} V. It turns a flux of {flux:.3f} Wb by up to {dr / flux * DEG:.0f}° in the first second",
-            f"R_R = {M.r_rotor:.2f} Ω, so a change of 0.5 A shows {0.5 * M.r_rotor:.1f} V",
-            f"{constant(INVERTER, 'residual_v'):.2f} V per phase",
-            f"4/π · {constant(INVERTER, 'residual_v'):.2f} V = {RESIDUAL:.2f} V",
-            f"With 1 A and 1 % this is {n['drift_per_min']:.0f} mechanical degrees per minute",
-            f"One degree at 1 A is {(1 + tangent**2) / M.tau:.0f} electrical degrees per second",
-            f"For c = 1.3 this is {n['warm_max']:.1f}°",
-        ],
-        "theory-source.md": [
+        "sources.md": [
+            f"{100 * M.sigma * M.tau * 50e-6 * 375**2 / 2:.1f} % at 375 rad/s and 50 µs",
             f"the resistance is {100 * M.r_s / x:.1f} % of the reactance",
             f"differ by {100 * (abs(complex(M.r_s + M.r_rotor, x)) / abs(complex(M.r_s, x)) - 1):.3f} %",
             f"a gain of g = {abs(response(sections(FILTERS, 'BPF'), 0)):.4f} at dc",
@@ -1535,6 +1525,13 @@ def quotes():
             f"At 2 A this is {100 * ((1 - n['re_s_2a']) / (1 + n['re_s_2a']) - 1):.0f} %",
         ],
         "theory-estimation.md": [
+            f"with i_d = {I_D} A and i_q = 1 A is {dr:.3f} V. It turns a flux of {flux:.3f} Wb by up to {dr / flux * DEG:.0f}° in the first second",
+            f"R_R = {M.r_rotor:.2f} Ω, so a change of 0.5 A shows {0.5 * M.r_rotor:.1f} V",
+            f"{constant(INVERTER, 'residual_v'):.2f} V per phase",
+            f"4/π · {constant(INVERTER, 'residual_v'):.2f} V = {RESIDUAL:.2f} V",
+            f"With 1 A and 1 % this is {n['drift_per_min']:.0f} mechanical degrees per minute",
+            f"One degree at 1 A is {(1 + tangent**2) / M.tau:.0f} electrical degrees per second",
+            f"For c = 1.3 this is {n['warm_max']:.1f}°",
             f"with Σ w² = {sum(w * w for w in triangle):.4f}",
             f"The factor {constant(ESTIMATOR, 'AVERAGED_NOISE'):.2f} (`AVERAGED_NOISE`) is {constant(ESTIMATOR, 'AVERAGED_NOISE') / WHITE:.2f} times the "
             f"{WHITE:.3f} that (N4) gives for the mean direction, and {constant(ESTIMATOR, 'AVERAGED_NOISE') / (period * math.sqrt(2)):.2f} times the "
@@ -1554,15 +1551,12 @@ def quotes():
             f"a phase margin of at least {math.floor(low)}° and a gain margin of at least {math.floor(10 * min(x[4] for x in margins_of_the_table())) / 10}",
             f"up to {slope(q_fast, 3.0) / slope(q_slow, 3.0):.1f} times the lasting one",
         ],
-        "theory-machines.md": [
+        "plants.md": [
             f"this is +{n['rotating_leakage']:.0f} %",
             f"the main inductance is {1e3 * m4[0]:.1f} mH along the flux and {1e3 * M.l_m:.1f} mH across it. The motor shows {1e3 * m4[1]:.1f} mH and "
             f"{1e3 * m4[2]:.1f} mH, a saliency of **+{100 * m4[3]:.2f} %**",
             f"For n = 6 (`m6`) it is +{100 * main_saliency(1.3, 6)[3]:.2f} %",
             f"at the {2.71 * math.sqrt(2):.2f} A peak".replace("at the", "At the"),
-        ],
-        "theory-identification.md": [
-            f"{100 * M.sigma * M.tau * 50e-6 * 375**2 / 2:.1f} % at 375 rad/s and 50 µs",
         ],
     }
 

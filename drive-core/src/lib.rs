@@ -104,6 +104,4 @@ mod generated;
 mod documents {
     #[doc = include_str!("../README.md")]
     struct Readme;
-    #[doc = include_str!("../../docs/porting.md")]
-    struct Porting;
 }

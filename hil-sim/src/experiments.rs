@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn the_example_of_the_book_runs_as_it_is_printed() {
-        let page = include_str!("../../docs/add-an-experiment.md");
+        let page = include_str!("../../docs/developing.md");
         let example = include_str!("experiments/tests/amplitude.rs");
         assert!(
             page.contains(&format!("```rust\n{example}```")),

@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use crate::cli_common::{folder, hil_sim, text};
 
 /// Documents whose Rust code is compiled and run: doctests of the control crates and `motor-plant`, a test of `hil-sim`.
-const RUST: [&str; 5] = [
+const RUST: [&str; 4] = [
     "drive-core/README.md",
     "drive-core/settings/README.md",
     "hil-sim/plant/README.md",
-    "docs/porting.md",
-    "docs/add-an-experiment.md",
+    "docs/developing.md",
 ];
 
 /// Collects the documents about the present state; the change log describes the past.

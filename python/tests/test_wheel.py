@@ -196,7 +196,7 @@ def test_the_readme_runs(tmp_path, monkeypatch):
 
 
 def test_a_run_is_a_table_with_units():
-    """The recipe of docs/python.md."""
+    """The recipe of docs/tools.md."""
     rig = drive.Rig(drive.Config())
     rig.start("torque")
     rig.command("torque", 2.0)
@@ -207,7 +207,7 @@ def test_a_run_is_a_table_with_units():
 
 
 def test_motors_run_on_all_cores():
-    """The recipe of docs/python.md: a run does not hold the interpreter."""
+    """The recipe of docs/tools.md: a run does not hold the interpreter."""
     def torque(motor):
         return drive.run("torque-steps", drive.Config(motor=motor))["metrics"]["angle_error_max_deg"]
 
