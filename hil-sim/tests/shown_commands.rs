@@ -49,13 +49,7 @@ fn commands_of_the_documents_run() {
         if elsewhere(command).is_some() {
             left += 1;
         } else if let Some(arguments) = command.strip_prefix("cargo sim") {
-            // A file of the repository, independent of the folder in which the command runs.
-            let here =
-                |word: &str| match Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(word) {
-                    path if word.contains('/') && path.is_file() => path.display().to_string(),
-                    _ => word.to_owned(),
-                };
-            let arguments: Vec<_> = arguments.split_whitespace().map(here).collect();
+            let arguments: Vec<_> = arguments.split_whitespace().map(of_repository).collect();
             let arguments: Vec<_> = arguments.iter().map(String::as_str).collect();
             let output = hil_sim(&folder, &arguments);
             if !output.status.success() {
@@ -68,6 +62,14 @@ fn commands_of_the_documents_run() {
     }
     println!("{ran} commands ran, {left} stand in the list with a reason");
     assert!(wrong.is_empty() && ran > 20, "{ran} ran\n{}", wrong.join("\n"));
+}
+
+/// Returns a word of a command; a file of the repository with a path that holds in any folder.
+fn of_repository(word: &str) -> String {
+    match Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(word) {
+        path if word.contains('/') && path.is_file() => path.display().to_string(),
+        _ => word.to_owned(),
+    }
 }
 
 /// Returns the beginning of the command in the list of those that are not run, and the reason.
@@ -118,8 +120,9 @@ fn shown_output_is_what_the_command_prints() {
             let (command, rest) = block.split_once('\n').unwrap();
             let (words, quoted) = command.split_once(" \"").unwrap_or((command, ""));
             let quoted = quoted.strip_suffix('"');
-            let words: Vec<_> = words.split_whitespace().chain(quoted).collect();
-            let output = hil_sim(&folder, &words);
+            let words = words.split_whitespace().map(of_repository);
+            let words: Vec<_> = words.chain(quoted.map(str::to_owned)).collect();
+            let output = hil_sim(&folder, &words.iter().map(String::as_str).collect::<Vec<_>>());
             let printed = format!("{}{}", text(&output.stdout), text(&output.stderr));
             let mut lines = printed.lines().map(str::trim_end);
             let mut skips = false;
@@ -135,7 +138,30 @@ fn shown_output_is_what_the_command_prints() {
             shown += 1;
         }
     }
-    assert!(shown > 5, "{shown}");
+    assert!(shown > 12, "{shown}");
+}
+
+/// A block `text` without a command shows what a drive says: each line stands in a session, which is played, or in the start code.
+#[test]
+fn shown_answers_are_those_of_the_sessions() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let files = ["tests/sessions", "tests/sessions/board"].map(|folder| root.join(folder));
+    let files = files.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap());
+    let files = files.map(|file| file.unwrap().path()).filter(|path| path.is_file());
+    let files = files.chain([root.join("src/chip/start.rs")]);
+    let said: String = files.map(|path| std::fs::read_to_string(path).unwrap()).collect();
+    let mut pages = Vec::new();
+    documents(&root.join("docs"), &mut pages);
+    let mut lines = 0;
+    for page in pages {
+        let document = std::fs::read_to_string(&page).unwrap();
+        let blocks = document.split("```text\n").skip(1).filter(|block| !block.starts_with('$'));
+        for line in blocks.flat_map(|block| block.split("```").next().unwrap().lines()) {
+            assert!(line == "..." || said.contains(line), "{}: {line}", page.display());
+            lines += 1;
+        }
+    }
+    assert!(lines > 5, "{lines}");
 }
 
 #[test]
