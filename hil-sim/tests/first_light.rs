@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use hil_sim::first_light::evidence::{Evidence, Record, SCHEMA, Verdict};
-use hil_sim::first_light::table::{Act, Limits, Read, Table};
+use hil_sim::first_light::table::{Act, Board, Limits, Read, Table};
 use hil_sim::plant::{
     Complex, Load, Machine, MachineSettings, Mechanics, MechanicsSettings, MotorModel,
     SaliencySettings,
@@ -12,48 +12,51 @@ use hil_sim::plant::{
 
 use crate::generated;
 
-fn limits(is: &Limits, unit: &str) -> String {
-    format!("{} to {} {unit}", is[0], is[1])
+/// The board whose numbers the tables of the page have.
+const SHOWN: &str = "nucleo-g474re-ihm08m1";
+
+fn limits(is: &Limits, unit: &str, board: &Board) -> String {
+    let [least, most] = is.each_ref().map(|end| (board.number(end) * 1e3).round() / 1e3);
+    format!("{least} to {most} {unit}").replace('-', "−")
 }
 
-/// Whether an act belongs to the column "expect", and its text.
-fn shown(act: &Act) -> (bool, String) {
-    let code = |line: &str| format!("`{line}`");
+/// Whether an act belongs to the column "expect", and its text for this board.
+fn shown(act: &Act, board: &Board) -> (bool, String) {
+    let code = |line: &str| format!("`{}`", board.fill(line));
     match act {
-        Act::Hand(what) | Act::Restart(what) => (false, what.clone()),
+        Act::Hand(what) | Act::Restart(what) => (false, board.fill(what)),
         Act::Send(line) => (false, code(line)),
-        Act::Often { line, times } => (false, format!("`{line}`, {times} times")),
+        Act::Often { line, times } => (false, format!("{}, {times} times", code(line))),
         Act::Setting(key) => (false, format!("`set {key} …`")),
         Act::Wait(seconds) => (false, format!("wait {seconds} s")),
-        Act::Hear(text) => (true, format!("`{}`", text.replace('`', ""))),
-        Act::Never(text) => (true, format!("not `{text}`")),
-        Act::See(what) => (true, what.clone()),
-        Act::Measure { what, unit, is } => (true, format!("{what} {}", limits(is, unit))),
+        Act::Hear(text) => (true, code(&text.replace('`', ""))),
+        Act::Never(text) => (true, format!("not {}", code(text))),
+        Act::See(what) => (true, board.fill(what)),
+        Act::Measure { what, unit, is } => {
+            (true, format!("{} {}", board.fill(what), limits(is, unit, board)))
+        }
         Act::Read(read) => {
             let place = read.place().trim_matches([' ', ',']);
             let more = if read.rise { " more than before" } else { "" };
-            (true, format!("`{place}` {}{more}", limits(&read.is, &read.unit)))
+            (true, format!("`{place}` {}{more}", limits(&read.is, &read.unit, board)))
         }
         Act::Noise(signal) => {
-            (true, format!("`{signal}`: mean within MEAN A of zero, noise below NOISE A rms"))
+            let text = "mean within MEAN A of zero, noise below NOISE A rms";
+            (true, format!("`{signal}`: {}", board.fill(text)))
         }
     }
 }
 
 fn page(table: &Table) -> String {
-    let boards: Vec<&str> = table.boards.iter().map(|board| board.name.as_str()).collect();
-    let mut text = format!("| | {} |\n|---|{}\n", boards.join(" | "), "---|".repeat(boards.len()));
-    for name in table.boards[0].values.keys() {
-        let values: Vec<_> = table.boards.iter().map(|board| board.values[name].as_str()).collect();
-        writeln!(text, "| {name} | {} |", values.join(" | ")).unwrap();
-    }
-    let mut number = 0;
+    let board = table.board(SHOWN).unwrap();
+    let others: Vec<_> = table.boards.iter().filter(|board| board.name != SHOWN).collect();
+    let (mut text, mut differ, mut number) = (String::new(), String::new(), 0);
     for part in &table.parts {
-        write!(text, "\n## {}\n\n{}\n\n", part.title, part.before.trim()).unwrap();
+        write!(text, "\n## {}\n\n{}\n\n", part.title, board.fill(part.before.trim())).unwrap();
         text += "| step | do | expect | otherwise |\n|---|---|---|---|\n";
         for step in &part.steps {
             number += 1;
-            let acts: Vec<_> = step.acts.iter().map(shown).collect();
+            let acts: Vec<_> = step.acts.iter().map(|act| shown(act, board)).collect();
             let column = |wanted: bool| {
                 let texts = acts.iter().filter(|(expect, _)| *expect == wanted);
                 texts.map(|(_, text)| text.as_str()).collect::<Vec<_>>().join("; ")
@@ -68,15 +71,27 @@ fn page(table: &Table) -> String {
                 ""
             };
             let (to_do, expect) = (column(false), column(true));
-            writeln!(
-                text,
-                "| {number} {}{mark} | {to_do} | {expect} | {} |",
-                step.name, step.otherwise
-            )
-            .unwrap();
+            let (name, otherwise) = (&step.name, board.fill(&step.otherwise));
+            writeln!(text, "| {number} {name}{mark} | {to_do} | {expect} | {otherwise} |").unwrap();
+            let has_own =
+                |act: &&Act| others.iter().any(|one| shown(act, one) != shown(act, board));
+            let own: Vec<_> = step.acts.iter().filter(has_own).collect();
+            let cell = |one: &&Board| {
+                let texts = own.iter().map(|act| shown(act, one).1.replace(&one.name, "NAME"));
+                let mut texts: Vec<_> = texts.collect();
+                texts.dedup();
+                texts.join("; ")
+            };
+            let cells: Vec<_> = others.iter().map(cell).collect();
+            if cells.iter().any(|cell| !cell.is_empty() && !cell.contains("NAME")) {
+                writeln!(differ, "| {number} {name} | {} |", cells.join(" | ")).unwrap();
+            }
         }
     }
-    text
+    let names: Vec<_> = others.iter().map(|board| board.name.as_str()).collect();
+    let rule = "---|".repeat(names.len() + 1);
+    let head = format!("| step | {} |\n|{rule}\n", names.join(" | "));
+    format!("{}\n## Numbers of the other boards\n\n{head}{differ}", text.trim_start())
 }
 
 #[test]
