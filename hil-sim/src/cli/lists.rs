@@ -22,8 +22,8 @@ pub fn experiments(as_json: bool, lab: bool) -> Result<String, Error> {
     shown.sort_by_key(place);
     let mut text = String::new();
     for Experiment { name, stands_for, about, .. } in shown {
-        let source = if lab { format!(" ({stands_for})") } else { String::new() };
-        let about = report::paragraph(&format!("{about}{source}"), 4);
+        let sourced = format!("{about} ({stands_for})");
+        let about = report::paragraph(if lab { &sourced } else { about }, 4);
         text.push_str(&format!("{name}\n{about}\n\n"));
     }
     if !lab {

@@ -1,16 +1,15 @@
 //! One experiment, or a group of them.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use signal_hook::consts::SIGINT;
 use trace::Voltages;
 
 use super::{say, used};
 use crate::config::motors::Motor;
 use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, TRACE, identify_trace as trace, scenario};
+use crate::first_light;
 use crate::journal::{self, Header, Journal};
 use crate::outcome::{self, Origin};
 use crate::passport;
@@ -238,21 +237,17 @@ fn resumed(
 /// Makes Ctrl-C say how many runs are kept in the file, and end the process.
 ///
 /// # Errors
-/// [`Error::Internal`] if the signal cannot be watched.
+/// As [`first_light::interruptible`].
 fn say_on_interrupt(path: &Path, all: usize) -> Result<(), Error> {
-    let (stop, path) = (Arc::new(AtomicBool::new(false)), path.to_owned());
-    signal_hook::flag::register(SIGINT, stop.clone())
-        .map_err(|e| Error::Internal(e.to_string()))?;
+    let (stop, path) = (first_light::interruptible()?, path.to_owned());
     std::thread::spawn(move || {
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(Duration::from_millis(50));
         }
-        let stored = std::fs::read(&path).unwrap_or_default();
-        let kept = stored.iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1);
+        let stored = std::fs::read_to_string(&path).unwrap_or_default();
+        let kept = stored.matches('\n').count().saturating_sub(1);
         let path = message(path.display());
-        eprintln!(
-            "\ninterrupted: {kept} of {all} runs are kept in {path}; the same command continues"
-        );
+        eprintln!("\ninterrupted: {path} keeps {kept} of {all} runs; the same command continues");
         std::process::exit(130)
     });
     Ok(())

@@ -44,42 +44,19 @@ fn write_metrics(text: &mut String, metrics: &Metrics) {
     text.push('\n');
 }
 
-/// Returns a table with aligned columns, with its title above and its note below. If the table is wider than 100 characters, the texts of its
-/// widest columns continue on further lines, where only a word longer than a third of that, such as a path, is broken.
+/// Returns a table with aligned columns, with its title above and its note below. If it is wider than 100 characters, the texts of its widest
+/// columns continue on further lines.
 pub fn table(table: &Table) -> String {
-    let (mut text, count) = (String::new(), table.columns.len());
-    let right: Vec<bool> = (0..count).map(|column| table.is_numeric(column)).collect();
-    let chars = |cell: &str| cell.chars().count();
-    let word = |cell: &str| cell.split(' ').map(chars).max().unwrap_or(0);
-    let longest = |column: usize, length: &dyn Fn(&str) -> usize| {
-        let cells = table.rows.iter().filter_map(|row| row.get(column));
-        cells.map(|cell| length(cell.text())).max().unwrap_or(0)
-    };
-    let cells: Vec<_> = (0..count).map(|column| longest(column, &chars)).collect();
-    let with_head = |column: usize, length: &dyn Fn(&str) -> usize| {
-        longest(column, length).max(length(&table.columns[column]))
-    };
-    let mut widths: Vec<_> = (0..count).map(|column| with_head(column, &chars)).collect();
-    let least: Vec<_> = (0..count).map(|column| with_head(column, &word).min(WIDTH / 3)).collect();
-    let gaps = 2 * count.saturating_sub(1);
-    while widths.iter().sum::<usize>() + gaps > WIDTH {
-        // Heads first, which are longer than what is below them.
-        let shrinks = (0..count).filter(|&column| widths[column] > least[column]);
-        let widest = shrinks.max_by_key(|&n| (widths[n] > cells[n], widths[n]));
-        let Some(widest) = widest else { break };
-        widths[widest] -= 1;
-    }
+    let (mut text, widths) = (String::new(), widths(table));
     let row = |cells: Vec<&str>| {
-        let parts = cells
-            .iter()
-            .zip(&widths)
-            .map(|(cell, &width)| textwrap::wrap(cell, options(width).break_words(true)));
+        let parts = cells.iter().zip(&widths).map(|(cell, &n)| textwrap::wrap(cell, options(n)));
         let parts: Vec<_> = parts.collect();
         let height = parts.iter().map(Vec::len).max().unwrap_or(0);
         let lines = (0..height).map(|line| {
-            let padded = parts.iter().zip(&widths).zip(&right).map(|((part, &width), right)| {
+            let padded = parts.iter().zip(&widths).enumerate().map(|(column, (part, &width))| {
                 let part = part.get(line).map_or("", |part| part.trim_end());
-                if *right { format!("{part:>width$}") } else { format!("{part:<width$}") }
+                let right = table.is_numeric(column);
+                if right { format!("{part:>width$}") } else { format!("{part:<width$}") }
             });
             padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
         });
@@ -89,7 +66,8 @@ pub fn table(table: &Table) -> String {
         let _ = writeln!(text, "{}", table.title);
     }
     let _ = writeln!(text, "{}", row(table.columns.iter().map(String::as_str).collect()));
-    let _ = writeln!(text, "{}", "-".repeat(widths.iter().sum::<usize>() + gaps));
+    let rule = widths.iter().map(|&width| "-".repeat(width)).collect::<Vec<_>>().join("--");
+    let _ = writeln!(text, "{rule}");
     for cells in &table.rows {
         let _ = writeln!(text, "{}", row(cells.iter().map(Cell::text).collect()));
     }
@@ -98,6 +76,28 @@ pub fn table(table: &Table) -> String {
     }
     text.push('\n');
     text
+}
+
+/// Returns the widths of the columns. To fit 100 characters, heads that are wider than what is below them shrink first, and nothing below
+/// its longest word, of which a third of the line counts.
+fn widths(table: &Table) -> Vec<usize> {
+    let chars = |cell: &str| cell.chars().count();
+    let word = |cell: &str| cell.split(' ').map(chars).max().unwrap_or(0);
+    let column = |(column, head): (usize, &String)| {
+        let cells = table.rows.iter().filter_map(|row| row.get(column)).map(Cell::text);
+        let least = cells.clone().map(word).fold(word(head), usize::max).min(WIDTH / 3);
+        let below = cells.map(chars).max().unwrap_or(0);
+        [below.max(chars(head)), below, least]
+    };
+    let mut columns: Vec<_> = table.columns.iter().enumerate().map(column).collect();
+    while columns.iter().map(|[width, ..]| width + 2).sum::<usize>() > WIDTH + 2 {
+        let shrinks = columns.iter_mut().filter(|[width, _, least]| width > least);
+        match shrinks.max_by_key(|[width, below, _]| (width > below, *width)) {
+            Some(widest) => widest[0] -= 1,
+            None => break,
+        }
+    }
+    columns.iter().map(|[width, ..]| *width).collect()
 }
 
 /// Longest line of a paragraph, characters.
@@ -111,14 +111,14 @@ pub fn paragraph(text: &str, indent: usize) -> String {
 
 /// Breaks a paragraph into lines of at most 100 characters, each after one of the two indents.
 fn wrap(paragraph: &str, first: &str, others: &str) -> String {
-    let options = options(WIDTH).initial_indent(first).subsequent_indent(others);
+    let options = options(WIDTH).break_words(false);
+    let options = options.initial_indent(first).subsequent_indent(others);
     textwrap::fill(&paragraph.split_whitespace().collect::<Vec<_>>().join(" "), options)
 }
 
-/// Returns the options to break lines at `width` characters, between words alone.
+/// Returns the options to break lines at `width` characters without hyphens.
 fn options(width: usize) -> textwrap::Options<'static> {
-    let options = textwrap::Options::new(width).break_words(false);
-    options.word_splitter(textwrap::WordSplitter::NoHyphenation)
+    textwrap::Options::new(width).word_splitter(textwrap::WordSplitter::NoHyphenation)
 }
 
 #[cfg(test)]
