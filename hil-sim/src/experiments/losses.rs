@@ -39,7 +39,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
                 ("flux", Cell::from(word)),
                 ("torque (% of the limit)", Cell::fixed(*percent, 0)),
                 ("torque (Nm)", Cell::fixed(nm, 2)),
-                ("direct current (A)", Cell::fixed(i_d, 2)),
+                ("d-axis current (A)", Cell::fixed(i_d, 2)),
                 ("loss (W)", Cell::fixed(loss, 1)),
                 ("least (W)", Cell::fixed(least, 1)),
                 ("loss of least", Cell::fixed(loss / least, 3)),
