@@ -89,9 +89,10 @@ fn page(table: &Table) -> String {
         }
     }
     let names: Vec<_> = others.iter().map(|board| board.name.as_str()).collect();
-    let rule = "---|".repeat(names.len() + 1);
-    let head = format!("| step | {} |\n|{rule}\n", names.join(" | "));
-    format!("{}\n## Numbers of the other boards\n\n{head}{differ}", text.trim_start())
+    text += "\n## Numbers of the other boards\n\n";
+    writeln!(text, "| step | {} |\n|{}", names.join(" | "), "---|".repeat(names.len() + 1))
+        .unwrap();
+    text.trim_start().to_owned() + &differ
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Stored runs of statistical experiments: continued runs that give the whole, byte for byte; refusals; records.
 
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 use crate::cli_common::{folder, hil_sim, object, text};
 
@@ -133,6 +134,22 @@ fn finished_runs_are_not_done_again_and_a_torn_line_is() {
         message.contains("here seed is 2, there 1") && output.status.code() == Some(2),
         "{message}"
     );
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupt_says_how_many_runs_are_kept() {
+    let folder = folder("journal-interrupt");
+    let mut long = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
+    long.current_dir(&folder).args(MONTE_CARLO).args(["--set", "runs=90000", "--resume", "kept"]);
+    let child = long.stderr(Stdio::piped()).spawn().unwrap();
+    while std::fs::metadata(folder.join("kept")).map_or(0, |kept| kept.len()) < 2000 {
+        std::thread::yield_now();
+    }
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(text(&output.stderr).contains("of 90000 runs; the same command"), "{output:?}");
+    assert_eq!(output.status.code(), Some(130));
 }
 
 /// The file has the random values and the results of each run, by the names that the documentation explains.

@@ -141,14 +141,13 @@ fn shown_output_is_what_the_command_prints() {
     assert!(shown > 12, "{shown}");
 }
 
-/// A block `text` without a command shows what a drive says: each line stands in a session, which is played, or in the start code.
+/// A block `text` without a command shows what a drive says: each line stands in a session, which is played, or in the code of the chip.
 #[test]
 fn shown_answers_are_those_of_the_sessions() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let files = ["tests/sessions", "tests/sessions/board"].map(|folder| root.join(folder));
+    let files = ["tests/sessions", "tests/sessions/board", "src/chip"].map(|one| root.join(one));
     let files = files.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap());
     let files = files.map(|file| file.unwrap().path()).filter(|path| path.is_file());
-    let files = files.chain([root.join("src/chip/start.rs")]);
     let said: String = files.map(|path| std::fs::read_to_string(path).unwrap()).collect();
     let mut pages = Vec::new();
     documents(&root.join("docs"), &mut pages);
