@@ -40,10 +40,10 @@ fn shown(act: &Act, board: &Board) -> (bool, String) {
             let more = if read.rise { " more than before" } else { "" };
             (true, format!("`{place}` {}{more}", limits(&read.is, &read.unit, board)))
         }
-        Act::Noise(signal) => {
-            let text = "mean within MEAN A of zero, noise below NOISE A rms";
-            (true, format!("`{signal}`: {}", board.fill(text)))
-        }
+        Act::Noise(signal) => (
+            true,
+            board.fill(&format!("`{signal}`: mean within MEAN A of zero, noise below NOISE A rms")),
+        ),
     }
 }
 
@@ -78,9 +78,7 @@ fn page(table: &Table) -> String {
             let own: Vec<_> = step.acts.iter().filter(has_own).collect();
             let cell = |one: &&Board| {
                 let texts = own.iter().map(|act| shown(act, one).1.replace(&one.name, "NAME"));
-                let mut texts: Vec<_> = texts.collect();
-                texts.dedup();
-                texts.join("; ")
+                texts.collect::<Vec<_>>().join("; ")
             };
             let cells: Vec<_> = others.iter().map(cell).collect();
             if cells.iter().any(|cell| !cell.is_empty() && !cell.contains("NAME")) {
