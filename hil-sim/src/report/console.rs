@@ -92,10 +92,8 @@ fn widths(table: &Table) -> Vec<usize> {
     let mut columns: Vec<_> = table.columns.iter().enumerate().map(column).collect();
     while columns.iter().map(|[width, ..]| width + 2).sum::<usize>() > WIDTH + 2 {
         let shrinks = columns.iter_mut().filter(|[width, _, least]| width > least);
-        match shrinks.max_by_key(|[width, below, _]| (width > below, *width)) {
-            Some(widest) => widest[0] -= 1,
-            None => break,
-        }
+        let Some(widest) = shrinks.max_by_key(|[n, below, _]| (n > below, *n)) else { break };
+        widest[0] -= 1;
     }
     columns.iter().map(|[width, ..]| *width).collect()
 }
