@@ -374,24 +374,18 @@ impl<D: DriveHandle> Access<'_, D> {
 
     /// Carries out *switch on* and *enable operation*, if the state has a transition for them.
     fn enable(&mut self, event: Event) -> Result<(), Exception> {
-        let (_, stays) = self.settings().quick_stop.reaction();
-        let power = match self.state() {
-            // Without such an option code, a quick stop goes on to its end.
-            Power::QuickStopActive if !stays => Power::QuickStopActive,
-            state => cia402::after(state, event),
-        };
-        if event == Event::SwitchOn {
+        let (state, (_, stays)) = (self.state(), self.settings().quick_stop.reaction());
+        // Without such an option code, a quick stop goes on to its end.
+        let ends = state == Power::QuickStopActive && !stays;
+        match if ends { state } else { cia402::after(state, event) } {
+            Power::NotReadyToSwitchOn | Power::SwitchOnDisabled | Power::QuickStopActive => {
+                self.may_command()?;
+                self.refuse(Refusal::Ended)
+            }
             // While the drive runs, the same bits disable the operation.
-            return match power {
-                Power::SwitchOnDisabled | Power::QuickStopActive => self.refuse(Refusal::Ended),
-                _ => self.stop(Stop::Ramp, event),
-            };
-        }
-        self.may_command()?;
-        match power {
+            _ if event == Event::SwitchOn => self.stop(Stop::Ramp, event),
             // The drive refuses a start with a latched fault and names it.
-            Power::OperationEnabled | Power::Fault => self.run(),
-            _ => self.refuse(Refusal::Ended),
+            _ => self.run(),
         }
     }
 
@@ -466,10 +460,6 @@ impl<D: DriveHandle> Access<'_, D> {
 }
 
 impl<D: DriveHandle> Registers for Access<'_, D> {
-    fn is_busy(&self) -> bool {
-        self.desk.is_busy()
-    }
-
     fn read(&mut self, at: u16) -> Result<u16, Exception> {
         self.bus.view(self.desk, self.drive).read(at)
     }

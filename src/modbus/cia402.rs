@@ -1,12 +1,7 @@
 //! The state machine of CiA 402 (IEC 61800-7-201): the effect of a control word in each state. It knows neither a bus nor the drive.
 
-use Event::{
-    Cleared, DisableVoltage, EnableOperation, Failed, QuickStop, Ready, Shutdown, Stopped, SwitchOn,
-};
-use Power::{
-    NotReadyToSwitchOn, OperationEnabled, QuickStopActive, ReadyToSwitchOn, SwitchOnDisabled,
-    SwitchedOn,
-};
+use Event::*;
+use Power::*;
 
 /// Bit of the control word: clear the latched fault.
 pub const FAULT_RESET: u16 = 1 << 7;
@@ -136,7 +131,7 @@ pub static TRANSITIONS: [Transition; 15] = transitions! {
     "11": [OperationEnabled] [QuickStop] QuickStopActive;
     "12": [QuickStopActive] [DisableVoltage, Stopped] SwitchOnDisabled;
     "13, 14": [NotReadyToSwitchOn, SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, OperationEnabled, QuickStopActive] [Failed] Fault;
-    "15": [Power::Fault] [Cleared] SwitchOnDisabled;
+    "15": [Fault] [Cleared] SwitchOnDisabled;
     "16": [QuickStopActive] [EnableOperation] OperationEnabled;
 };
 

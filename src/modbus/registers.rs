@@ -294,12 +294,18 @@ impl View<'_> {
             Some(Stage::Stopping) => STATE_STOPS,
             _ => 0,
         };
-        let reverse = if self.rpm() < -0.5 { TURNS_REVERSE } else { 0 };
-        let by_bus = if self.settings.command.commander == Commander::Bus { BY_BUS } else { 0 };
-        let assumed = if self.speed_is_assumed() { SPEED_ASSUMED } else { 0 };
-        let at_speed = if self.at_speed { AT_SPEED } else { 0 };
-        let standstill = if self.standstill { STANDSTILL } else { 0 };
-        state | reverse | by_bus | at_speed | standstill | assumed
+        state
+            | bits([
+                (self.rpm() < -0.5, TURNS_REVERSE),
+                (self.bus_commands(), BY_BUS),
+                (self.at_speed, AT_SPEED),
+                (self.standstill, STANDSTILL),
+                (self.speed_is_assumed(), SPEED_ASSUMED),
+            ])
+    }
+
+    fn bus_commands(&self) -> bool {
+        self.settings.command.commander == Commander::Bus
     }
 
     /// The control word that leads to the state.
@@ -329,24 +335,22 @@ impl View<'_> {
     }
 
     fn status_word(&self) -> u16 {
-        let mut word = self.power.bits();
-        if self.status.is_some() && self.dc_link() > self.settings.drive.dc_under_v() {
-            word |= cia402::VOLTAGE_ENABLED;
-        }
-        if self.settings.command.commander == Commander::Bus {
-            word |= cia402::REMOTE;
-        }
-        if self.speed_is_assumed() {
-            word |= cia402::SPEED_ASSUMED;
-        }
-        if self.at_speed {
-            word |= cia402::TARGET_REACHED;
-        }
-        if self.standstill {
-            word |= cia402::STANDSTILL;
-        }
-        word
+        let has_voltage =
+            self.status.is_some() && self.dc_link() > self.settings.drive.dc_under_v();
+        self.power.bits()
+            | bits([
+                (has_voltage, cia402::VOLTAGE_ENABLED),
+                (self.bus_commands(), cia402::REMOTE),
+                (self.at_speed, cia402::TARGET_REACHED),
+                (self.standstill, cia402::STANDSTILL),
+                (self.speed_is_assumed(), cia402::SPEED_ASSUMED),
+            ])
     }
+}
+
+/// The bits whose condition holds.
+fn bits(of: [(bool, u16); 5]) -> u16 {
+    of.into_iter().filter(|(holds, _)| *holds).fold(0, |word, (_, bit)| word | bit)
 }
 
 impl Row {

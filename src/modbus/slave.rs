@@ -48,8 +48,6 @@ pub type Written = (u16, u16);
 
 /// The registers of a slave.
 pub trait Registers {
-    /// Whether every request is to be answered with [`Exception::ServerDeviceBusy`].
-    fn is_busy(&self) -> bool;
     /// The word of a register.
     ///
     /// # Errors
@@ -91,7 +89,6 @@ pub fn answer(
         return false;
     }
     let asked = match asked(pdu) {
-        _ if registers.is_busy() => Err(Exception::ServerDeviceBusy),
         Ok(Asked::Write(_, at, words)) => {
             registers.write(at, words).and_then(|()| self::asked(pdu))
         }

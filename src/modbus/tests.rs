@@ -30,10 +30,6 @@ use crate::store::FlashError;
 struct Memory(Vec<u16>);
 
 impl Registers for Memory {
-    fn is_busy(&self) -> bool {
-        false
-    }
-
     fn read(&mut self, at: u16) -> Result<u16, Exception> {
         let word = self.0.get(usize::from(at).wrapping_sub(0x2000));
         word.copied().ok_or(Exception::IllegalDataAddress)
