@@ -4,7 +4,7 @@
 //! # comment
 //! > start                 types `start`; the lines below it are the answer that must come within 5 s
 //! ok
-//! [until: torque]         goes on when console, log or board have said a line with `torque`, at most 30 s later
+//! [until: torque]         waits for a line with `torque` of console, log or board, at most 30 s, and for what follows closely
 //! [until 2 s: torque]     the same, at most 2 s later
 //! [500 ms]                lets time pass
 //! >> torque 1             types `torque 1` and goes on at once
@@ -33,7 +33,7 @@ pub const SILENT: &str = "-> nothing said";
 const LONGEST_S: f64 = 3600.0;
 
 /// Longest wait for an answer, s: more than twice that for the slowest one.
-const ANSWER_S: f64 = 5.0;
+pub(super) const ANSWER_S: f64 = 5.0;
 
 /// A request of a script.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,7 +44,7 @@ pub struct Step {
     pub own: Option<Own>,
     /// Whether the answer to the line ends the step.
     pub asks: bool,
-    /// The text that ends the step. It must come.
+    /// The text after whose lines the step ends. It must come.
     pub until: Option<String>,
     /// Longest duration of the step, s.
     pub within: f64,
@@ -87,9 +87,11 @@ impl Step {
         own.map(Self::own).ok_or_else(|| "no such command".to_owned())
     }
 
-    /// Lasts until the effect of the command is seen.
+    /// Lasts until the effect of the command is seen. The program filters contacts for some time, so that their effect
+    /// belongs to the next step.
     fn own(own: Own) -> Self {
-        Self { own: Some(own), within: 1e-3, ..Self::default() }
+        let within = if matches!(own, Own::Wires(_)) { 0.0 } else { 1e-3 };
+        Self { own: Some(own), within, ..Self::default() }
     }
 }
 

@@ -12,7 +12,7 @@ use drive_stream::{Piece, Splitter};
 use hil_sim::{board::LogLevel, rig::RATE_HZ};
 use induction_drive::console::line::UNASKED;
 
-use super::script::{Script, Step, failure};
+use super::script::{ANSWER_S, Script, Step, failure};
 use super::transcript::{Assembler, Line, Source};
 use super::{flash_file::FlashFile, own::Own, pty::Pty, record::Record};
 use crate::board::{Board, Period};
@@ -31,7 +31,7 @@ const LATE: Duration = Duration::from_millis(100);
 /// Time without a line after which a session without a person shows its time.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(10);
 
-/// Time without a line after which an answer is complete, s: longer than any line takes on the wire.
+/// Time without a line after which an answer, or what belongs to an awaited text, is complete, s: longer than any line takes on the wire.
 const SILENCE_S: f64 = 0.06;
 /// The reason why a session has ended, in words.
 type End = &'static str;
@@ -183,14 +183,20 @@ impl Session {
         step.typed.iter().for_each(|line| self.type_line(line));
         step.own.iter().try_for_each(|own| self.carry_out(own))?;
         let answers = |line: &Line| line.source == Source::Said && !line.text.starts_with(UNASKED);
-        while self.seen.end.is_none() && !self.seen.has_come {
+        let mut latest = began + step.within;
+        while self.seen.end.is_none() {
             let (now, since) = (self.board.time(), &self.lines[from..]);
             let is_silent = now > since.last().map_or(began, |line| line.time) + SILENCE_S;
-            let is_answered = step.asks && is_silent && since.iter().any(answers);
-            if is_answered || now - began >= step.within {
+            let has_come = self.seen.has_come;
+            let is_answered = has_come || step.asks && since.iter().any(answers);
+            if is_answered && is_silent || now >= latest {
                 break;
             }
             self.turn()?;
+            // The lines that belong to an awaited text follow it.
+            if self.seen.has_come && !has_come {
+                latest = self.board.time() + ANSWER_S;
+            }
         }
         if let Some(text) = step.until.as_ref().filter(|_| !self.seen.has_come) {
             self.add(Source::Board, format!("nothing said `{text}` within {} s", step.within));
