@@ -16,6 +16,7 @@ mod power_limit;
 mod protections;
 mod replay;
 mod restart;
+mod rows;
 mod run_up;
 mod saliency_check;
 mod sensorless_position;

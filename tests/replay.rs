@@ -7,7 +7,7 @@
 
 mod board;
 mod packed;
-mod player;
+pub mod player;
 mod scenes;
 
 use std::fs;

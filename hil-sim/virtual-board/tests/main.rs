@@ -25,6 +25,7 @@ mod preemption;
 mod printed;
 mod register_check;
 mod registers;
+mod rows;
 mod rules;
 mod same_physics;
 mod save;
