@@ -51,9 +51,9 @@ struct Lasting {
 
 impl Lasting {
     fn follow(&mut self, is: bool, now_ms: u32, for_s: f32) {
-        let since = if is { Some(self.since_ms.unwrap_or(now_ms)) } else { None };
-        self.since_ms = since;
-        self.told = since.is_some_and(|at| now_ms.wrapping_sub(at) as f32 >= 1e3 * for_s);
+        self.since_ms = is.then(|| self.since_ms.unwrap_or(now_ms));
+        let lasts = |at| now_ms.wrapping_sub(at) as f32 >= 1e3 * for_s;
+        self.told = self.since_ms.is_some_and(lasts);
     }
 }
 
@@ -121,9 +121,7 @@ impl Bus {
             let waited_ms = now_ms.wrapping_sub(*asked_ms.get_or_insert(now_ms));
             waited_ms as f32 >= 1e3 * settings.delay_s
         });
-        if frame.is_some() {
-            self.asked_ms = None;
-        }
+        self.asked_ms = self.asked_ms.filter(|_| frame.is_none());
         // The master has given up a request from before a design. An answer would be taken for the answer to another request.
         let late = desk.has_designed(&mut self.designs);
         let mut access = Access { bus: self, desk, drive, commanded: false };
@@ -316,10 +314,8 @@ impl<D: DriveHandle> Access<'_, D> {
         let commands = self.desk.commander() == Commander::Bus;
         // Anybody may stop the drive. A release by a master that does not command changes nothing.
         if word & ACTION == STOP || (word == 0 && commands) {
-            let stop = match self.settings().stop {
-                StopBy::Ramp => Stop::Ramp,
-                StopBy::Coast => Stop::Coast,
-            };
+            let coasts = self.settings().stop == StopBy::Coast;
+            let stop = if coasts { Stop::Coast } else { Stop::Ramp };
             return self.stop(stop, Event::Shutdown);
         }
         if word == 0 {

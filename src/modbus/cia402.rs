@@ -49,11 +49,6 @@ impl Power {
         (Self::Fault, "fault", 0x08),
     ];
 
-    /// Name in the standard.
-    pub const fn name(self) -> &'static str {
-        Self::ALL[self as usize].1
-    }
-
     /// Bits 0 to 3, 5 and 6 of the status word.
     pub const fn bits(self) -> u16 {
         Self::ALL[self as usize].2

@@ -170,11 +170,8 @@ fn asked(pdu: &[u8]) -> Result<Asked<'_>, Exception> {
     };
     let whole = |data: &Data<'_>, most| {
         let count = data.len();
-        if (1..=most).contains(&count) && data.payload().len() == 2 * count {
-            Ok(2 * count)
-        } else {
-            Err(Exception::IllegalDataValue)
-        }
+        let fits = (1..=most).contains(&count) && data.payload().len() == 2 * count;
+        fits.then_some(2 * count).ok_or(Exception::IllegalDataValue)
     };
     match Request::try_from(pdu) {
         Ok(Request::ReadHoldingRegisters(at, count) | Request::ReadInputRegisters(at, count)) => {
