@@ -136,7 +136,7 @@ const FREE: &str = "load.mode=free";
 #[test]
 fn sensorless() {
     for mode in [Mode::Torque, Mode::Speed, Mode::Position] {
-        let bench = Bench::new(&[FREE, "angle.source=injection"], mode);
+        let bench = Bench::new(&[FREE, "angle_source=injection"], mode);
         assert!(bench.try_all() >= 6);
     }
 }
@@ -144,7 +144,7 @@ fn sensorless() {
 #[test]
 fn with_the_encoder_and_the_rotor_tracked() {
     for mode in [Mode::Torque, Mode::Speed, Mode::Position] {
-        let bench = Bench::new(&[FREE, "angle.source=encoder"], mode);
+        let bench = Bench::new(&[FREE, "angle_source=encoder"], mode);
         assert!(bench.try_all() >= 8);
     }
 }
@@ -159,7 +159,7 @@ fn by_voltage_and_frequency_learning_and_commissioning() {
 /// Settings are accepted only while the outputs are off, and as a whole: between two steps of the drive.
 #[test]
 fn settings_are_taken_while_off() {
-    let config = config(&[FREE, "angle.source=encoder"]);
+    let config = config(&[FREE, "angle_source=encoder"]);
     for turn in 0..CARRIER_SAMPLES {
         let mut rig = Rig::from_config(&config, 1).unwrap();
         rig.wait(1.0);

@@ -42,7 +42,7 @@ const LPF_DC: f64 = 0.944_061;
 fn encoder_rig(iq: f64, amplitude_v: f64, parts: &[&[&'static str]]) -> Rig {
     let mut changes = all(parts);
     let amplitude = format!("injection.amplitude_v={amplitude_v}");
-    let id = format!("reference.id_a={}", 0.7 / LPF_DC);
+    let id = format!("sequence.i_d={}", 0.7 / LPF_DC);
     changes.extend([amplitude.as_str(), id.as_str()]);
     beside_encoder(&config(&changes), 1, (iq / LPF_DC) as f32, 0.4)
 }
@@ -106,7 +106,7 @@ fn the_printed_chain_is_blind_and_the_rectified_is_not() {
     let moved_by = |demodulator: &'static str| {
         let config = config(&all(&[
             &IDEAL,
-            &["angle.compensate_delays=false"],
+            &["ignore_delays=yes"],
             match demodulator {
                 "literal" => &["injection.demodulator=literal"],
                 _ => &["injection.demodulator=rectified"],

@@ -43,7 +43,7 @@ struct Stand {
 impl Stand {
     /// A firmware with the encoder, with these changes of the configuration, and these settings of the firmware.
     fn new(changes: &[&str], settings: &str) -> Self {
-        let usual = ["angle.source=encoder", "sequence.magnetise_s=0.3"];
+        let usual = ["angle_source=encoder", "sequence.magnetise_s=0.3"];
         let config = config(&[&usual[..], changes].concat());
         let mut own = FirmwareSettings::of_the_board();
         own.drive = config.drive;
@@ -466,7 +466,7 @@ fn a_load_does_not_fall_before_the_brake_has_closed() {
 #[test]
 fn a_drive_that_is_off_shows_no_torque_and_the_last_speed() {
     for end in ["coast", "fault", "ramp"] {
-        let injection = ["load.mode=free", "angle.source=injection"];
+        let injection = ["load.mode=free", "angle_source=injection"];
         let own = "bus.commands=bus;bus.alive=any;stop.coasts_s=3;injection.allow_unlearned=yes";
         let mut stand = Stand::new(&injection, own);
         assert_ne!(stand.read(0x2101) & 0x8000, 0, "after a reset nobody knows");

@@ -9,7 +9,7 @@ use hil_sim::rig::Point;
 fn measure(rpm: f64, ignore_delays: bool) -> (f64, f64) {
     let speed = format!("load.speed_rpm={rpm}");
     let mut changes = all(&[&IDEAL, &ISOTROPIC]);
-    changes.extend(["angle.source=encoder", "load.mode=speed", speed.as_str()]);
+    changes.extend(["angle_source=encoder", "load.mode=speed", speed.as_str()]);
     let config = config(&changes);
     let mut drive = config.drive;
     drive.ignore_delays = ignore_delays;

@@ -60,9 +60,9 @@ fn turns(rig: &mut Rig) -> f64 {
 fn the_stop_becomes_position_0() {
     let heavier = ["motor.inertia=0.06", "drive.motor.inertia=0.06"];
     for (source, heavier, accuracy) in [
-        ("angle.source=encoder", &[][..], 0.002),
-        ("angle.source=encoder", &heavier[..], 0.035),
-        ("angle.source=injection", &[][..], 0.015),
+        ("angle_source=encoder", &[][..], 0.002),
+        ("angle_source=encoder", &heavier[..], 0.035),
+        ("angle_source=injection", &[][..], 0.015),
     ] {
         let plans =
             [(30.0, 0.6), (-30.0, 0.6), (60.0, 1.0), (-60.0, 0.4), (60.0, 1.5), (10.0, 0.5)];
@@ -86,7 +86,7 @@ fn the_stop_becomes_position_0() {
 #[test]
 fn friction_that_holds_the_shaft_is_no_stop() {
     let plan = Plan { rpm: 30.0, i_q: 0.5, turns: 1.0 };
-    let mut held = rig(&["angle.source=encoder", "shaft.static_nm=1.2"], 1);
+    let mut held = rig(&["angle_source=encoder", "shaft.static_nm=1.2"], 1);
     assert_eq!(home(&mut held, plan).0, Err(Failure::Held));
 }
 
@@ -95,7 +95,7 @@ fn friction_that_holds_the_shaft_is_no_stop() {
 #[test]
 fn position_0_outlives_a_stop_with_the_encoder() {
     for (source, keeps, moved) in [("encoder", true, 0.01), ("injection", false, 0.06)] {
-        let mut rig = rig(&[&format!("angle.source={source}")], 3);
+        let mut rig = rig(&[&format!("angle_source={source}")], 3);
         home(&mut rig, Plan { rpm: 60.0, i_q: 0.6, turns: 3.0 }).0.unwrap();
         rig.command(&Command::Position(-1.0)).unwrap();
         rig.wait(4.0);

@@ -55,7 +55,7 @@ fn a_gain_mismatch_of_the_sensors_is_found() {
 fn after_learning_a_mismatch_costs_no_accuracy() {
     let mismatch = ["runs=24", "measurement.gain_error_a=0.01"];
     let before = run("monte-carlo", &mismatch, 41).metrics;
-    let after = run("monte-carlo", &all(&[&mismatch, &["drive.learn=true"]]), 41).metrics;
+    let after = run("monte-carlo", &all(&[&mismatch, &["prepare.learn=true"]]), 41).metrics;
     println!("{before:?}\n{after:?}");
     let rms = |m: &hil_sim::outcome::Metrics| m.get("angle_error_rms_deg").unwrap();
     // 4.0 before, 1.5 after over 300 runs.

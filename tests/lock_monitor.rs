@@ -81,7 +81,7 @@ fn a_relock_on_request_goes_on_without_torque() {
 /// If the dc link is too low for the full injected voltage, the voltage is reduced, and the angle stays right.
 #[test]
 fn a_carrier_that_does_not_fit_is_made_smaller_and_the_angle_stays_right() {
-    let low = config(&["inverter.vdc=203", "injection.amplitude_v=103"]);
+    let low = config(&["inverter.dc_link_v=203", "injection.amplitude_v=103"]);
     let mut rig = regulating(&low, 6, 2.5, 1.0);
     let worst = angle_error(&mut rig, 1.0).largest();
     let share = rig.drive.telemetry().carrier_share;

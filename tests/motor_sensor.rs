@@ -8,7 +8,7 @@ use hil_sim::rig::Rig;
 
 /// With a sensor, derating from 120 °C, trip at 140 °C.
 fn sensed() -> Config {
-    let mut config = config(&["angle.source=encoder", "load.mode=free", "speed.limit_rpm=1000"]);
+    let mut config = config(&["angle_source=encoder", "load.mode=free", "speed.limit_rpm=1000"]);
     config.drive.motor_sensor.sensor = SensorKind::Pt1000;
     config
 }
@@ -50,7 +50,7 @@ fn a_start_is_refused_without_a_sound_reading() {
     read(&mut rig, Ok(25.0));
     rig.start(Mode::Torque).unwrap();
 
-    let mut rig = Rig::from_config(&config(&["angle.source=encoder"]), 1).unwrap();
+    let mut rig = Rig::from_config(&config(&["angle_source=encoder"]), 1).unwrap();
     read(&mut rig, Err(Fault::MotorSensorOpen));
     rig.start(Mode::Torque).unwrap();
     read(&mut rig, Ok(300.0));

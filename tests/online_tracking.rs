@@ -40,7 +40,7 @@ fn with_the_encoder_the_angle_stays_right_while_the_rotor_warms_up() {
     // within 5.2 % at nine points; the larger bound is for the seeds.
     for (speed_rpm, iq_a, residual) in [(150.0, 2.0, 0.82), (30.0, 1.0, 2.05), (600.0, 1.0, 0.82)] {
         let residual = format!("inverter.residual_v={residual}");
-        let config = config(&["angle.source=encoder", &residual]);
+        let config = config(&["angle_source=encoder", &residual]);
         for seed in [1, 2] {
             let case = WarmingCase { speed_rpm, iq_a, ..CASE };
             let (error, count, angle) = end(&run(&config, &case, seed).unwrap());
@@ -82,7 +82,7 @@ fn without_a_sensor_it_takes_a_flux_that_moves() {
 #[test]
 fn no_torque_no_estimate() {
     // At i_q = 0 the rotor carries no current, so its resistance cannot be identified.
-    let config = config(&["angle.source=encoder"]);
+    let config = config(&["angle_source=encoder"]);
     let moments = run(&config, &WarmingCase { iq_a: 0.0, seconds: 6.0, ..CASE }, 1).unwrap();
     assert!(moments.iter().all(|m| m.estimate.is_err()));
 }
@@ -93,7 +93,7 @@ type Profile = [(f64, f32)];
 /// Tracks over a profile of the torque with the encoder. Returns the relative error of each estimate, and at the end that of the value in
 /// use.
 fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>, f64) {
-    let mut config = config(&["angle.source=encoder"]);
+    let mut config = config(&["angle_source=encoder"]);
     let settings = Settings { track_rotor: true, ..config.drive };
     config.motor.r_r *= r_r;
     config.inverter.residual_v = Some(residual);
@@ -186,7 +186,7 @@ fn what_is_not_a_signal_gives_no_estimate_and_does_no_harm() {
 
 #[test]
 fn the_drive_takes_a_time_constant_only_if_it_is_wanted_bounded_and_slowly() {
-    let config = config(&["angle.source=encoder"]);
+    let config = config(&["angle_source=encoder"]);
     let settings = config.drive;
     let mut rig = Rig::new(&plant_settings(&config), &settings, 1).unwrap();
     rig.start(Mode::Torque).unwrap();

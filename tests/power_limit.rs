@@ -75,7 +75,7 @@ fn the_dc_current_is_within_three_percent_of_its_limits() {
                 format!("limits.dc_motoring_a={motoring}"),
                 format!("limits.dc_generating_a={generating}"),
             );
-            let source = format!("angle.source={source}");
+            let source = format!("angle_source={source}");
             let changes = [motor, &[&from, &to, &source]].concat();
             let mut rig = driven(&changes, seed, rpm);
             for i_q in [3.0_f32, -3.0] {
@@ -105,7 +105,7 @@ fn the_dc_current_is_within_three_percent_of_its_limits() {
 /// The power is held while the speed passes through all quadrants, with the requested torque where the power allows it.
 #[test]
 fn the_power_is_held_over_all_speeds() {
-    let limits = ["limits.motoring_w=150", "limits.generating_w=50", "angle.source=encoder"];
+    let limits = ["limits.motoring_w=150", "limits.generating_w=50", "angle_source=encoder"];
     for i_q in [2.5_f32, -2.5] {
         let mut rig = driven(&[A, &limits].concat(), 1, 0.0);
         rig.command(&Command::Torque(i_q)).unwrap();
@@ -136,7 +136,7 @@ fn at_rest_torque_is_not_reversed() {
     let none = [
         "limits.generating_w=0",
         "limits.motoring_w=120",
-        "angle.source=encoder",
+        "angle_source=encoder",
         "load.mode=free",
     ];
     let mut rig = Rig::from_config(&config(&[&A[1..], &none].concat()), 1).unwrap();
@@ -149,7 +149,7 @@ fn at_rest_torque_is_not_reversed() {
         assert!((found - rpm).abs() < 5.0, "{torque} Nm, {rpm} rpm: {found}");
     }
     let least = 1.5 * 5.4 * 1.4 * 1.4;
-    let few = [format!("limits.motoring_w={}", least + 0.1), "angle.source=encoder".into()];
+    let few = [format!("limits.motoring_w={}", least + 0.1), "angle_source=encoder".into()];
     let changes = [A, &[few[0].as_str(), few[1].as_str()]].concat();
     let mut rig = driven(&changes, 1, 0.0);
     rig.command(&Command::Torque(2.0)).unwrap();

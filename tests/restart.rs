@@ -60,7 +60,7 @@ impl Draw {
 /// Restarts this motor after these draws; returns no result if it cannot be learned.
 fn restarts(motor: &str, plant: &str, draws: impl Iterator<Item = Draw>) -> Option<Restarts> {
     let plant = format!("plant={plant}");
-    let changes = [plant.as_str(), "load.mode=free", "angle.source=injection", "prepare.learn=yes"];
+    let changes = [plant.as_str(), "load.mode=free", "angle_source=injection", "prepare.learn=yes"];
     let mut config = Config::load(Some(motor), None, &changes).unwrap();
     let c = &mut config.drive;
     let rated = f64::from(c.nameplate.frequency_hz) * 60.0 / f64::from(c.motor.pole_pairs);

@@ -103,7 +103,7 @@ fn a_blocked_shaft_is_survived() {
 /// The speed mode with the encoder.
 #[test]
 fn with_the_encoder_the_speed_is_exact() {
-    let config = config(&[FREE, "angle.source=encoder", "speed.limit_rpm=1440"]);
+    let config = config(&[FREE, "angle_source=encoder", "speed.limit_rpm=1440"]);
     let mut rig = regulating(&config, 3, 600.0);
     rig.set_load(Load::Free { torque: 0.6 }).unwrap();
     let (_, dip, _) = watch(&mut rig, 600.0, 1.0);

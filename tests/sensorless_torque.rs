@@ -5,7 +5,7 @@ use crate::common::{IDEAL, all, config, run};
 /// The chain of the source with a rectifier.
 const RECTIFIED: [&str; 1] = ["injection.demodulator=rectified"];
 /// The source compensates no delay.
-const AS_PRINTED: [&str; 1] = ["angle.compensate_delays=false"];
+const AS_PRINTED: [&str; 1] = ["ignore_delays=yes"];
 
 /// A weak saliency with the constant 10 mA offset does not explain the 40° to 60° of the source, which states them at every level: with a
 /// tenth of the assumed saliency the same chain errs by tens of degrees, three times as much at 2 A as at 1 A.

@@ -33,7 +33,7 @@ fn stopped(changes: &[&str], mode: Mode, rpm: f64, stop: Stop) -> (f64, f64) {
 #[test]
 fn ramp_and_quick_stop_bring_the_shaft_to_rest_and_coast_does_not() {
     for changes in
-        [["load.mode=free", "angle.source=injection"], ["load.mode=free", "angle.source=encoder"]]
+        [["load.mode=free", "angle_source=injection"], ["load.mode=free", "angle_source=encoder"]]
     {
         for (mode, rpm) in [(Mode::Speed, 300.0), (Mode::Speed, -240.0), (Mode::Torque, 300.0)] {
             let run = |stop| stopped(&changes, mode, rpm, stop);
@@ -69,7 +69,7 @@ fn the_dc_link_holds_a_quick_stop_back() {
 /// `stop ramp`. The speed does not overshoot by more than the noise, and there is no jerk.
 #[test]
 fn an_s_ramp_rounds_speed_and_stop() {
-    let changes = ["load.mode=free", "angle.source=encoder", "speed.s_ramp_s=0.5"];
+    let changes = ["load.mode=free", "angle_source=encoder", "speed.s_ramp_s=0.5"];
     let mut rig = Rig::from_config(&config(&changes), 1).unwrap();
     rig.start(Mode::Speed).unwrap();
     let mut speeds = Vec::new();
@@ -98,7 +98,7 @@ fn an_s_ramp_rounds_speed_and_stop() {
 #[test]
 fn a_start_turns_a_stop_round_in_each_mode() {
     const MOMENTS: usize = 100;
-    let changes = ["load.mode=free", "prepare.learn=yes", "angle.source=injection"];
+    let changes = ["load.mode=free", "prepare.learn=yes", "angle_source=injection"];
     for (mode, stop, seed) in [
         (Mode::Speed, Stop::Ramp, 1),
         (Mode::Speed, Stop::Quick, 2),

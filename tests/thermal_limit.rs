@@ -45,7 +45,7 @@ fn the_torque_falls_back_to_what_is_carried_for_ever() {
         ("inverter", 2.6, 0.1, Limiting::Inverter),
     ] {
         let (a, s) = (format!("limits.{who}_a={carried}"), format!("limits.{who}_s={tau_s}"));
-        for source in ["angle.source=injection", "angle.source=encoder"] {
+        for source in ["angle_source=injection", "angle_source=encoder"] {
             let changes = [a.as_str(), s.as_str(), source, "load.mode=locked"];
             let body = (carried, tau_s, why);
             let (load, current, limited) = settles(&changes, body, 3.0 + 4.0 * tau_s);
@@ -62,7 +62,7 @@ fn the_torque_falls_back_to_what_is_carried_for_ever() {
 #[test]
 fn what_cannot_fall_back_trips() {
     let changes =
-        ["limits.motor_a=0.5", "limits.motor_s=1", "angle.source=encoder", "load.mode=locked"];
+        ["limits.motor_a=0.5", "limits.motor_s=1", "angle_source=encoder", "load.mode=locked"];
     let mut rig = Rig::from_config(&config(&changes), 1).unwrap();
     rig.command(&Command::Start(Mode::Torque)).unwrap();
     rig.wait(3.0);

@@ -103,13 +103,13 @@ fn the_right_wiring_is_accepted_over_motors_and_seeds() {
         for leakage in [0.0138, 0.0276, 0.0552] {
             for seed in 0..12 {
                 let motor = [
-                    format!("motor.rs={resistance}"),
-                    format!("motor.lls={leakage}"),
-                    format!("motor.llr={leakage}"),
+                    format!("motor.r_s={resistance}"),
+                    format!("motor.l_ls={leakage}"),
+                    format!("motor.l_lr={leakage}"),
                     // The resistance in the drive's settings stays.
-                    "drive.motor.rs=5.4".into(),
-                    "drive.motor.lls=0.0276".into(),
-                    "drive.motor.llr=0.0276".into(),
+                    "drive.motor.r_s=5.4".into(),
+                    "drive.motor.l_ls=0.0276".into(),
+                    "drive.motor.l_lr=0.0276".into(),
                 ];
                 let motor: Vec<&str> = motor.iter().map(String::as_str).collect();
                 let (state, peak) = check(Wiring::Right, &motor, seed);
@@ -147,10 +147,10 @@ fn every_wrong_wiring_is_named_and_no_current_comes_near_half_an_ampere() {
 fn a_motor_that_is_far_from_its_settings_is_refused_below_the_bound() {
     for seed in 0..10 {
         let motor = [
-            "motor.lls=0.0055",
-            "motor.llr=0.0055",
-            "drive.motor.lls=0.0276",
-            "drive.motor.llr=0.0276",
+            "motor.l_ls=0.0055",
+            "motor.l_lr=0.0055",
+            "drive.motor.l_ls=0.0276",
+            "drive.motor.l_lr=0.0276",
         ];
         let (state, peak) = check(Wiring::Right, &motor, seed);
         assert_eq!(state, State::Fault(Fault::WiringCurrent), "seed {seed}");

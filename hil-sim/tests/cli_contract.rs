@@ -75,7 +75,7 @@ fn csv_has_a_file_for_every_figure_and_table() {
 fn a_page_names_itself_its_origin_and_its_settings() {
     let folder = folder("origin");
     let arguments =
-        ["run", "torque-steps", "--seconds", "0.5", "--seed", "5", "--set", "motor.rs=6"];
+        ["run", "torque-steps", "--seconds", "0.5", "--seed", "5", "--set", "motor.r_s=6"];
     assert_eq!(hil_sim(&folder, &arguments).status.code(), Some(0));
     let page = std::fs::read_to_string(folder.join("out/torque-steps.html")).unwrap();
     let version = format!("hil-sim {}", env!("CARGO_PKG_VERSION"));

@@ -84,41 +84,6 @@ fn toml_of_the_wrong_type_or_name_is_refused() {
 }
 
 #[test]
-fn old_names_are_accepted() {
-    let old = [
-        "motor.rs=6",
-        "motor.rr=1.2",
-        "motor.lls=0.03",
-        "motor.llr=0.02",
-        "motor.lm=0.2",
-        "drive.motor.rs=5",
-        "inverter.vdc=300",
-        "inverter.dead_time_us=3",
-        "angle.source=encoder",
-        "angle.compensate_delays=false",
-        "reference.id_a=0.9",
-        "drive.learn=true",
-    ];
-    let today = [
-        "motor.r_s=6",
-        "motor.r_r=1.2",
-        "motor.l_ls=0.03",
-        "motor.l_lr=0.02",
-        "motor.l_m=0.2",
-        "drive.motor.r_s=5",
-        "inverter.dc_link_v=300",
-        "inverter.dead_time_s=0.000003",
-        "angle_source=encoder",
-        "ignore_delays=yes",
-        "sequence.i_d=0.9",
-        "prepare.learn=yes",
-    ];
-    let load = |all: [&str; 12]| Config::load(None, None, &all).unwrap();
-    assert_eq!(load(old), load(today));
-    assert_eq!(load(old).drive.motor.r_s, 5.0);
-}
-
-#[test]
 fn the_scales_of_the_drive_follow_the_sensors() {
     let config = set("measurement.range_a=50").unwrap();
     assert!((config.drive.sensor_range_a() - 50.0).abs() < 1e-3);

@@ -19,7 +19,7 @@ pub const IDEAL: [&str; 6] = [
     "measurement.lsb_a=0.00014",
     "measurement.filter_hz=0",
     "inverter.residual_v=0",
-    "inverter.dead_time_us=0",
+    "inverter.dead_time_s=0",
     "inverter.propagation_us=0",
 ];
 
