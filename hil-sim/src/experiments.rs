@@ -6,6 +6,7 @@ pub mod battery;
 pub mod commission;
 pub mod course;
 mod current_step;
+mod disturbed;
 pub mod drawn_machine;
 mod foreign_motors;
 pub mod full_range;

@@ -6,18 +6,16 @@
 //! flux is below half or above twice its nominal value for as long. It is *silent* (undetected) if it is wrong or its
 //! flux is off.
 
-pub(super) mod disturbed;
-mod kind;
 mod run;
 mod summary;
 
 use std::sync::OnceLock;
 
-pub use kind::{KINDS, Kind};
 pub use run::{learned_drive, trial};
 pub use summary::Summary;
 
-use super::course::Trial;
+use super::course::{KINDS, Kind, Trial, chosen};
+use super::disturbed;
 use crate::prelude::*;
 
 /// Number of runs after which the drive repeats the saliency self-commissioning.
@@ -104,7 +102,7 @@ impl Study for Battery {
         let config = context.config.clone();
         check_model(&config)?;
         let after = config.after_learning()?;
-        let (kinds, runs) = kind::chosen(&config);
+        let (kinds, runs) = chosen(&config);
         let runs = config.extent.runs.map_or(runs, |runs| runs as usize);
         let drives = std::iter::repeat_with(OnceLock::new).take(runs.div_ceil(GROUP)).collect();
         Ok(Self { config, after, seed: context.seed, kinds, runs, drives })

@@ -1,9 +1,13 @@
 //! A run over time: the shaft, the parts one after the other, and what changes in them. The bench of the stress test runs it.
 
 mod bench;
+mod kind;
+mod limits;
 mod trial;
 
 pub use bench::Bench;
+pub use kind::{KINDS, Kind, chosen};
+pub use limits::{allowed_a, nominal_limit_a, share_of_limit, torque_limit_a, torque_nm};
 pub use trial::{CLASSES_PER_DEG, Refused, Trial, UNNOTICED_S};
 
 /// A value at the beginning and at the end of a part, with a straight line between them.
@@ -46,7 +50,7 @@ pub enum Change {
 }
 
 /// A part of a run. Currents and speeds are for the dissertation's motor; on others they are in proportion, q-axis
-/// currents to the [nominal limit](super::torque_limit::nominal_limit_a).
+/// currents to the [nominal limit](nominal_limit_a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
     /// q-axis current, A, or speed, rpm. None: unchanged.

@@ -7,12 +7,12 @@ use std::f64::consts::{SQRT_2, TAU};
 use drive_commission::Refusal;
 use drive_settings::{Flux, SettingsError};
 
-use super::battery::{Kind, Summary, disturbed, trial};
+use super::battery::{Summary, trial};
 use super::commission::{Outside, Session, unaware};
-use super::course::{Refused, Trial};
+use super::course::{Kind, Refused, Trial, allowed_a, nominal_limit_a};
+use super::disturbed;
 use super::drawn_machine::Circuit;
 use super::saliency::Probe;
-use super::torque_limit::{allowed_a, nominal_limit_a};
 use crate::config::plate::rated;
 use crate::prelude::*;
 use crate::stats::exact;

@@ -3,8 +3,9 @@
 mod held;
 
 use self::held::{Held, Standstill, reversing};
+use super::course::allowed_a;
 use super::steady::{bring_up, prepared};
-use super::torque_limit::{BEYOND_A, TorqueLimit, allowed_a};
+use super::torque_limit::{BEYOND_A, TorqueLimit};
 use crate::prelude::*;
 
 /// Time after the torque command that is not judged, s: flux, angle and dynamometer settle.

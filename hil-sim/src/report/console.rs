@@ -66,8 +66,8 @@ pub fn table(table: &Table) -> String {
         let _ = writeln!(text, "{}", table.title);
     }
     let _ = writeln!(text, "{}", row(table.columns.iter().map(String::as_str).collect()));
-    let rule = widths.iter().map(|&width| "-".repeat(width)).collect::<Vec<_>>().join("--");
-    let _ = writeln!(text, "{rule}");
+    text += &widths.iter().map(|&width| "-".repeat(width)).collect::<Vec<_>>().join("--");
+    text.push('\n');
     for cells in &table.rows {
         let _ = writeln!(text, "{}", row(cells.iter().map(Cell::text).collect()));
     }

@@ -1,9 +1,7 @@
 //! One run of the stress test.
 
 use super::Learnt;
-use super::kind::Kind;
-use crate::experiments::course::{Bench, Course, Shaft, Trial};
-use crate::experiments::torque_limit::{allowed_a, nominal_limit_a};
+use crate::experiments::course::{Bench, Course, Kind, Shaft, Trial, allowed_a, nominal_limit_a};
 use crate::prelude::*;
 
 /// Longest saliency self-commissioning, s.
@@ -53,10 +51,10 @@ pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Tr
 
 #[cfg(test)]
 mod tests {
-    use super::super::disturbed::Asymmetry;
     use super::*;
     use crate::experiments::course::Change;
-    use crate::experiments::torque_limit::torque_nm;
+    use crate::experiments::course::torque_nm;
+    use crate::experiments::disturbed::Asymmetry;
 
     /// A lower limit is visible in every run, and the torque is judged by the accepted command. With 0.5 A for any
     /// command the error stays that of a healthy drive, a few per cent of the torque at the limit.

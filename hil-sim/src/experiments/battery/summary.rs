@@ -1,6 +1,6 @@
 //! The verdict on many runs of the stress test.
 
-use super::kind::Kind;
+use crate::experiments::course::Kind;
 use crate::experiments::course::{CLASSES_PER_DEG, Trial, UNNOTICED_S};
 use crate::prelude::*;
 
@@ -194,8 +194,8 @@ pub fn figure(trials: &[Trial]) -> Figure {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kind::Kind;
     use super::*;
+    use crate::experiments::course::Kind;
 
     fn sound(errors: &[f64]) -> Trial {
         let mut trial = Trial { kind: Some(Kind::Steps), ..Trial::default() };

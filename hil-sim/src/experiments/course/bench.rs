@@ -1,8 +1,8 @@
 //! A drive and a plant in a run, with the quantities that are observed.
 
+use super::limits::{nominal_limit_a, share_of_limit, torque_nm};
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
 use super::{Change, Part, Shaft};
-use crate::experiments::torque_limit::{nominal_limit_a, share_of_limit, torque_nm};
 use crate::prelude::*;
 
 /// Error beyond which the angle is wrong, degrees, unless the run sets another limit.

@@ -1,6 +1,6 @@
 //! The result of a course.
 
-use crate::experiments::battery::Kind;
+use super::kind::Kind;
 use crate::prelude::*;
 
 /// Duration, s, after which a state should have been detected.
@@ -61,7 +61,7 @@ pub struct Trial {
     pub dc_link_v: (f64, f64),
     /// Time until a flying start found the flux, or a stop had ended, s.
     pub took_s: Option<f64>,
-    /// q-axis current that the drive allows, relative to the [nominal limit](crate::experiments::torque_limit::nominal_limit_a).
+    /// q-axis current that the drive allows, relative to the [nominal limit](super::nominal_limit_a).
     pub limit_share: Option<f64>,
     /// Mean torque of the motor minus the torque of the q-axis current that the drive accepted, in the direction of
     /// that current and relative to the torque at the nominal limit; only for a run at constant torque that reached its

@@ -1,8 +1,8 @@
 //! The course of a run, and its result.
 
 use super::case::Case;
+use crate::experiments::course::nominal_limit_a;
 use crate::experiments::course::{Bench, Change, Course, Part, Ramp, Shaft, Trial};
-use crate::experiments::torque_limit::nominal_limit_a;
 use crate::prelude::*;
 
 /// Smallest and largest constant q-axis current, relative to the current limit.

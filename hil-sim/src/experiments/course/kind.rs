@@ -1,9 +1,9 @@
 //! The kinds of runs, each with the commands to the drive over time.
 
-use super::disturbed::Asymmetry;
+use super::limits::{MOST_A, nominal_limit_a, torque_nm};
+use super::{Change, Course, Part, Ramp, Shaft};
 use crate::config::BatteryRuns;
-use crate::experiments::course::{Change, Course, Part, Ramp, Shaft};
-use crate::experiments::torque_limit::{MOST_A, nominal_limit_a, torque_nm};
+use crate::experiments::disturbed::Asymmetry;
 use crate::prelude::*;
 
 /// A kind of run. Currents, speeds and torques are for the dissertation's motor; on others they are in proportion,
