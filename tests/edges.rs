@@ -201,7 +201,7 @@ fn a_coasting_stop_is_off_within_200_ms_whatever_is_set() {
     {
         let silence = if way == "silence" { "command.timeout_s=0.4" } else { "" };
         let start = "strip.enable=yes;strip.start=switch;strip.preset_1_rpm=1200;strip.presets=yes";
-        let all = format!("bus.commands={from};{start};{silence};{setting}");
+        let all = format!("bus.commands={from};bus.stop=coast;{start};{silence};{setting}");
         let mut stand = Stand::new(shaft, &all);
         stand.terminals.closed = Contacts(Contacts::ENABLE.0 | 1 << 5);
         stand.wait(200);
@@ -467,7 +467,7 @@ fn a_load_does_not_fall_before_the_brake_has_closed() {
 fn a_drive_that_is_off_shows_no_torque_and_the_last_speed() {
     for end in ["coast", "fault", "ramp"] {
         let injection = ["load.mode=free", "angle_source=injection"];
-        let own = "bus.commands=bus;bus.alive=any;stop.coasts_s=3;injection.allow_unlearned=yes";
+        let own = "bus.commands=bus;bus.stop=coast;bus.alive=any;stop.coasts_s=3;injection.allow_unlearned=yes";
         let mut stand = Stand::new(&injection, own);
         assert_ne!(stand.read(0x2101) & 0x8000, 0, "after a reset nobody knows");
         stand.write(FREQUENCY, 1000);

@@ -30,6 +30,8 @@ const REVERSE: u16 = 1 << 5;
 /// Bits of the reset register: clear the latched fault; base block, which switches the outputs off at once.
 const CLEAR: u16 = 1 << 1;
 const BASE_BLOCK: u16 = 1 << 2;
+/// Time between two looks at the speed, ms.
+const LOOKS_MS: u32 = 10;
 
 /// Whether a write is a stop, which acts also while the drive is busy.
 pub fn is_stop((at, word): Written) -> bool {
@@ -52,8 +54,7 @@ struct Lasting {
 impl Lasting {
     fn follow(&mut self, is: bool, now_ms: u32, for_s: f32) {
         self.since_ms = is.then(|| self.since_ms.unwrap_or(now_ms));
-        let lasts = |at| now_ms.wrapping_sub(at) as f32 >= 1e3 * for_s;
-        self.told = self.since_ms.is_some_and(lasts);
+        self.told = self.since_ms.is_some_and(|at| now_ms.wrapping_sub(at) as f32 >= 1e3 * for_s);
     }
 }
 
@@ -75,6 +76,7 @@ pub struct Bus {
     resets: bool,
     at_speed: Lasting,
     standstill: Lasting,
+    looked_ms: u32,
     /// Time at which a request was seen that waits for the delay before its answer, ms.
     asked_ms: Option<u32>,
     faults: FaultLog,
@@ -111,10 +113,14 @@ impl Bus {
         if !desk.is_busy() {
             self.follow_run(desk, drive);
         }
-        let view = self.view(desk, drive);
-        let (reached, rests) = (view.is_at_reference(), view.is_at_standstill());
-        self.at_speed.follow(reached, now_ms, settings.steady_s);
-        self.standstill.follow(rests, now_ms, settings.steady_s);
+        // Seldom, because a pass of the main loop must be shorter than a byte of the console.
+        if now_ms.wrapping_sub(self.looked_ms) >= LOOKS_MS {
+            self.looked_ms = now_ms;
+            let view = self.view(desk, drive);
+            let (reached, rests) = (view.is_at_reference(), view.is_at_standstill());
+            self.at_speed.follow(reached, now_ms, settings.steady_s);
+            self.standstill.follow(rests, now_ms, settings.steady_s);
+        }
         // The request itself waits: its answer could not be kept without the memory of a frame.
         let asked_ms = &mut self.asked_ms;
         let frame = port.receive(|| {
@@ -343,12 +349,12 @@ impl<D: DriveHandle> Access<'_, D> {
         if self.bus.ended {
             return self.refuse(Refusal::Ended);
         }
-        if !self.bus.runs() {
-            self.order(Order::Start(Mode::Speed))?;
-            (self.bus.power, self.bus.given) = (Power::OperationEnabled, None);
-            return Ok(());
+        if self.bus.runs() {
+            return self.refer();
         }
-        self.refer()
+        self.order(Order::Start(Mode::Speed))?;
+        (self.bus.power, self.bus.given) = (Power::OperationEnabled, None);
+        Ok(())
     }
 
     /// Carries out a control word of CiA 402. A run keeps the direction.

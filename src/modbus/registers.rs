@@ -155,7 +155,7 @@ pub static ROWS: [Row; 34] = rows! {
     0x6041: Word(|v| v.status_word()), "", "status word of CiA 402, see below";
     0x605a: Word(|v| v.settings.modules.bus.quick_stop.word().parse().unwrap_or(0)), "", "quick stop option code of CiA 402: `bus.quick_stop`";
     MODE: Word(|_| VELOCITY), "", "mode of operation of CiA 402: 2, velocity; other values are refused with exception 3";
-    0x6061: Word(|v| v.mode()), "", "mode of operation in force: 1 position, 2 velocity, 4 torque, 0 another or none";
+    0x6061: Word(|v| if v.status.is_some_and(|s| s.state == State::Speed) { VELOCITY } else { 0 }), "", "mode of operation in force: 2 while the speed is regulated, otherwise 0";
 };
 
 impl View<'_> {
@@ -276,15 +276,6 @@ impl View<'_> {
     fn heat_sink(&self) -> f32 {
         let scales = &self.settings.drive.scales;
         self.status.map_or(0.0, |status| scales.ntc.celsius(status.sample.heat_sink))
-    }
-
-    fn mode(&self) -> u16 {
-        match self.status.map(|status| status.state) {
-            Some(State::Position) => 1,
-            Some(State::Speed | State::VoltsPerHertz) => VELOCITY,
-            Some(State::Torque) => 4,
-            _ => 0,
-        }
     }
 
     fn delta_status(&self) -> u16 {
