@@ -170,7 +170,7 @@ pub enum Refusal {
     Charged(f32),
     /// The bus tries to set a setting of the hardware.
     Hardware(Key),
-    /// The bus repeats its run command after a stop from another source.
+    /// The bus commands a run that needs a stop before it: after a stop from elsewhere, or by the states of CiA 402.
     Ended,
     /// A module does not let the drive run.
     Held(&'static str),

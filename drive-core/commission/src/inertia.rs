@@ -35,7 +35,7 @@ const EXPLAINED: f32 = 0.9;
 /// show 0.004 to 0.054 of it at high flux. Couplings with a resonance of 15 or 30 Hz and 0.7 % damping show 0.07 or more on the motors whose speed
 /// loop they make oscillate; one of 60 Hz is not seen, and does not disturb the loop.
 const RINGS: f32 = 0.06;
-/// The same as a multiple of what is seen before the impulse: the speed of the dissertation's motor at low flux is noisy, 0.11.
+/// The limit is at least this multiple of the change before the impulse, because a noisy speed changes as well (0.11 at low flux).
 const OF_NOISE: f32 = 1.5;
 /// Shortest and longest impulse of torque, and the time for which the speed is watched after it, s.
 const IMPULSE_S: (f32, f32) = (2e-3, 0.05);
