@@ -180,17 +180,18 @@ const COLOURS = ['#3b82f6', '#ef4444', '#22a559', '#d97706', '#a855f7', '#0891b2
 const SYMBOLS = { a: 'A', v: 'V', hz: 'Hz', deg: '°', nm: 'Nm', c: '°C' };
 const WORDS = { state: ['off', 'starting', 'running', 'stopping'],
   limit: ['none', 'voltage', 'heat sink', 'motor', 'inverter', 'dc link high', 'brake resistor', 'dc link low', 'ride-through', 'dc current or power'] };
-let streamed = [], times = [], columns = [], paused = false, recorded = null, base = null, plots = [], shown = 0, phi = null;
+let streamed = [], times = [], columns = [], paused = false, recorded = null, base = null, previous = 0, plots = [], shown = 0, phi = null;
 /** The streamed signals, and the speed that was asked for beside the present one. */
 const plotted = () => streamed.concat(streamed.includes('speed_rpm') ? 'asked_rpm' : []);
 /** Keeps frames of ten little-endian words: period, sequence number, eight values. */
 function takeFrames(view) {
   for (let at = 0; at + 40 <= view.byteLength; at += 40) {
     const period = view.getUint32(at, true);
-    base ??= period;
+    base ??= previous = period;
+    // The drive was reset, and counts its periods anew.
+    if ((period - previous | 0) < 0) { base = period; times = []; columns = columns.map(() => []); }
+    previous = period;
     const time = ((period - base) >>> 0) * PERIOD_S;
-    // The drive was reset.
-    if (time < times.at(-1)) { times = []; columns = columns.map(() => []); }
     const values = streamed.map((_, i) => view.getFloat32(at + 8 + 4 * i, true));
     times.push(time);
     columns.forEach((column, i) => column.push(i < values.length ? values[i] : regulated() === 'speed' ? asked.speed : null));
