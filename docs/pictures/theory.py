@@ -1485,8 +1485,8 @@ def quotes():
             f"a plant with {n['fast_15']:.1f} times the gain at 1.5 A",
             f"the fast one grows from {n['fast_0']:.2f} of it to {slope(q_fast, 3.0) / slope(q_slow, 3.0):.1f} times as much",
             f"at 3 A this limit is {n['limit_ref_3a']:.4f}, and q_ref is {signal(tensor(complex(I_D, 3.0), 1)):.4f}",
-            f"At 1.5 A this is {cell(n['early_15'], 4)} /rad, which is {100 - 100 * n['early_15'] / slope(q_slow, 1.5):.0f} % less than the lasting "
-            f"{cell(slope(q_slow, 1.5), 4)} /rad. At 3 A it is {100 - 100 * n['early_3'] / slope(q_slow, 3.0):.0f} % less",
+            f"With i_q = 1.5 A this is {cell(n['early_15'], 4)} /rad, which is {100 - 100 * n['early_15'] / slope(q_slow, 1.5):.0f} % less than the lasting "
+            f"{cell(slope(q_slow, 1.5), 4)} /rad. With i_q = 3 A it is {100 - 100 * n['early_3'] / slope(q_slow, 3.0):.0f} % less",
             f"1/(2π τ_r) = {M.alpha / TAU:.2f} Hz sees (T22a). The default loop has {constant(SETTINGS, 'bandwidth_hz')} Hz",
             f"(exactly at {zeros(lambda x: slope(q_fast, x) - slope(q_slow, x), 0.3, 1.5, 60)[0]:.2f} A)",
             f"the lasting one stays within {math.ceil(max(abs(100 - 50 * slope(q_slow, x) / A_PSI) for x in OFFSET_CURRENTS))} % of 2a",
