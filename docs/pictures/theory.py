@@ -1529,7 +1529,7 @@ def quotes():
             f"R_R = {M.r_rotor:.2f} Ω, so a change of 0.5 A shows {0.5 * M.r_rotor:.1f} V",
             f"{constant(INVERTER, 'residual_v'):.2f} V per phase",
             f"4/π · {constant(INVERTER, 'residual_v'):.2f} V = {RESIDUAL:.2f} V",
-            f"With 1 A and 1 % this is {n['drift_per_min']:.0f} mechanical degrees per minute",
+            f"With i_q = 1 A, i_d = 0.7 A and δ = 1 % this is {n['drift_per_min']:.0f} mechanical degrees per minute",
             f"One degree at 1 A is {(1 + tangent**2) / M.tau:.0f} electrical degrees per second",
             f"For c = 1.3 this is {n['warm_max']:.1f}°",
             f"with Σ w² = {sum(w * w for w in triangle):.4f}",
