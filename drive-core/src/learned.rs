@@ -140,11 +140,11 @@ impl fmt::Display for Learned {
         let (least, least_limit_a) = (Verdict::least(slope), self.least_limit_a());
         match self.verdict {
             Verdict::Sound => {
-                write!(f, "slope {slope:.4} /rad, torque current up to {limit_a:.2} A")
+                write!(f, "slope {slope:.4} /rad, q-axis current up to {limit_a:.2} A")
             }
             Verdict::Weak => write!(
                 f,
-                "weak: slope {slope:.4} /rad is less than {WEAK} times the least, {least}; torque current up to {limit_a:.2} A"
+                "weak: slope {slope:.4} /rad is less than {WEAK} times the least, {least}; q-axis current up to {limit_a:.2} A"
             ),
             Verdict::SlopeTooSmall => {
                 write!(f, "slope {slope:.4} /rad, which must be {least} at least")

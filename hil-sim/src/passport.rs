@@ -153,7 +153,7 @@ pub fn of_console(text: &str) -> Result<Passport, String> {
         let number = Some(found.value).filter(|value| (value + found.deviation).is_finite());
         number.ok_or_else(|| format!("{name} = {} is not a finite number", found.value))
     };
-    for name in ["r_s", "sigma L_s", "inverter voltage", "asymmetry", "torque current up to"] {
+    for name in ["r_s", "sigma L_s", "inverter voltage", "asymmetry", "q-axis current up to"] {
         found(name)?;
     }
     let get =

@@ -37,8 +37,8 @@ fn shown(act: &Act, board: &Board) -> (bool, String) {
         }
         Act::Read(read) => {
             let place = read.place().trim_matches([' ', ',']);
-            let more = if read.rise { " more than before" } else { "" };
-            (true, format!("`{place}` {}{more}", limits(&read.is, &read.unit, board)))
+            let change = if read.rise { "changes by " } else { "" };
+            (true, format!("`{place}` {change}{}", limits(&read.is, &read.unit, board)))
         }
         Act::Noise(signal) => (
             true,
@@ -57,9 +57,21 @@ fn page(table: &Table) -> String {
         for step in &part.steps {
             number += 1;
             let acts: Vec<_> = step.acts.iter().map(|act| shown(act, board)).collect();
+            // What a person does and then expects is one round; with several rounds each has its number in both columns.
+            let mut rounds = vec![[Vec::new(), Vec::new()]];
+            for (expect, text) in &acts {
+                if !expect && rounds.last().is_some_and(|[_, seen]| !seen.is_empty()) {
+                    rounds.push([Vec::new(), Vec::new()]);
+                }
+                rounds.last_mut().unwrap()[usize::from(*expect)].push(text.as_str());
+            }
             let column = |wanted: bool| {
-                let texts = acts.iter().filter(|(expect, _)| *expect == wanted);
-                texts.map(|(_, text)| text.as_str()).collect::<Vec<_>>().join("; ")
+                let filled = rounds.iter().enumerate().filter_map(|(n, round)| {
+                    let text = round[usize::from(wanted)].join("; ");
+                    let number = if rounds.len() > 1 { format!("({}) ", n + 1) } else { "".into() };
+                    (!text.is_empty()).then(|| number + &text)
+                });
+                filled.collect::<Vec<_>>().join("<br>")
             };
             let mark = if step.judges {
                 " **J**"
@@ -86,7 +98,7 @@ fn page(table: &Table) -> String {
             }
         }
     }
-    let names: Vec<_> = others.iter().map(|board| board.name.as_str()).collect();
+    let names: Vec<_> = others.iter().map(|board| format!("board `{}`", board.name)).collect();
     text += "\n## Numbers of the other boards\n\n";
     writeln!(text, "| step | {} |\n|{}", names.join(" | "), "---|".repeat(names.len() + 1))
         .unwrap();

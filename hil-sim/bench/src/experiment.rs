@@ -106,9 +106,9 @@ pub fn is_lost(largest_deg: f64, has_stopped: bool) -> bool {
 pub fn assumptions(config: &Config) -> Vec<String> {
     let (s, motor) = (plant_settings(config).saliency, config.motor_text());
     vec![format!(
-        "Simulated motor: {motor}, with a flux-fixed saliency of {:.2} % at nominal flux and {:.2} \
-         %/A by the current. Nothing in the source measures the saliency: every angle error here is a \
-         statement about this simulated motor.",
+        "Simulated motor: {motor}. Its saliency is assumed: {:.2} % fixed to the flux, at nominal flux, \
+         and {:.2} % per ampere of stator current. No source states it, so every angle error here holds \
+         for this simulated motor only.",
         s.a_psi * 100.0,
         s.b1 * 100.0
     )]

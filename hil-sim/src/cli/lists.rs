@@ -136,6 +136,6 @@ fn motor_text(motor: &Motor) -> Result<String, Error> {
     Ok(format!(
         "{name}: {title}\n{about}\n{table}Leakage inductance {leakage:.4} mH, rotor time constant {tau_r:.0} ms, \
          injected voltage {carrier:.1} V.\nTorque ripple of the injection at standstill: {nm:.3} Nm at 600 Hz, {percent:.0} % of the \
-         rated torque, by a current of {amperes:.3} A.\n\nAt the console, with the scales of your board:\n{lines}\n"
+         rated torque, by an injection current of {amperes:.3} A peak.\n\nTo type at the console of your board:\n{lines}\n"
     ))
 }

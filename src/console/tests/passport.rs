@@ -130,7 +130,7 @@ fn what_a_passport_lacks_is_named() {
     assert!((r_s.value / 3.7 - 1.0).abs() < 0.01 && r_s.deviation > 0.0 && r_s.unit == "ohm");
     assert!(passport.over_torque_current.len() > 5, "{passport:?}");
     let names: Vec<&str> = passport.measured.iter().map(|found| found.name.as_str()).collect();
-    for name in ["r_b over r_c, less 1", "gain mismatch", "slope", "torque current up to"] {
+    for name in ["r_b over r_c, less 1", "gain mismatch", "slope", "q-axis current up to"] {
         assert!(names.contains(&name), "{name}: {names:?}");
     }
     // Items missing in the console's text.

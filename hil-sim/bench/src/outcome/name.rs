@@ -29,7 +29,7 @@ pub fn split_unit(name: &str) -> Option<(&str, &'static str)> {
 
 /// Converts a name to words: `angle_error_rms_deg` becomes `angle error rms (°)`.
 pub fn words(name: &str) -> String {
-    match split_unit(name).filter(|(quantity, _)| !quantity.ends_with("_per")) {
+    match split_unit(name).filter(|(of, _)| !of.ends_with("_per") && !of.ends_with(".r")) {
         Some((quantity, unit)) => format!("{} ({unit})", quantity.replace('_', " ")),
         None => name.replace('_', " "),
     }
