@@ -129,7 +129,7 @@ pub fn of_console(text: &str) -> Result<Passport, String> {
             let line = line
                 .replace("weak: ", "")
                 .replace(" is less than", " (")
-                .replace(", torque", "; torque");
+                .replace(", q-axis", "; q-axis");
             refused = refused.or(line.starts_with("not used").then(|| line.clone()));
             let used = line.split("; ").filter(|part| !part.ends_with("not used)"));
             (learned, table) =

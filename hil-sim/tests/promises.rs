@@ -62,8 +62,8 @@ fn the_readme_states_the_torque_ripple_of_the_injection() {
     let mut others: Vec<f64> = others.map(|name| ripple_pct(&name, &[])).collect();
     others.sort_by(f64::total_cmp);
     let sentence = format!(
-        "its peak is {low:.0} to {high:.0} % of the rated torque on the dissertation's motor, {:.0} to {:.0} % on {} other \
-         [motors](docs/motors.md), and {spindle:.0} % on the spindle",
+        "its peak is {low:.0} % (low flux) to {high:.0} % (high flux) of the rated torque on the dissertation's motor, {:.0} to \
+         {:.0} % on {} other [motors](docs/motors.md), and {spindle:.0} % on the spindle",
         others[0],
         others[others.len() - 1],
         others.len()

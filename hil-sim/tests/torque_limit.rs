@@ -61,7 +61,7 @@ fn the_page_prints_the_torque_limits() {
         if name == "dissertation" {
             let (_, high) = limit(name, &["sequence.flux=high"]);
             let sentence = format!(
-                "gives {:.2} Nm at rest, {:.0} % of rated, at the dissertation's low flux, and {:.2} Nm, {:.0} %, with `sequence.flux=high`",
+                "gives {:.2} Nm at rest, {:.0} % of its rated torque, if the drive keeps the [low flux](docs/control-law.md#flux-level) that the dissertation uses. With `sequence.flux=high` it gives {:.2} Nm, {:.0} % of its rated torque",
                 on_a.nm, on_a.percent, high.nm, high.percent
             );
             assert!(first.contains(&sentence), "README.md: {sentence}");
@@ -73,7 +73,7 @@ fn the_page_prints_the_torque_limits() {
     let most = others.iter().copied().fold(0.0, f64::max);
     assert!(most - least < 1.0, "one number is enough for all: {others:?}");
     let sentence = format!(
-        "[other motors](docs/performance.md#torque-at-standstill) reach up to {least:.0} %,"
+        "[Other motors](docs/performance.md#torque-at-standstill) reach up to {least:.0} % of their rated torque,"
     );
     assert!(first.contains(&sentence), "README.md: {sentence}");
     generated::check("performance.md", "torque", &table);

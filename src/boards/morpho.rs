@@ -62,7 +62,7 @@ pub const FAULT: FaultInput = fault("ground PA6: `status` must show the break");
 pub const CURRENT_DELAY_S: Stated<f32> =
     assumed(0.4e-6, "rise time of the amplifier's output after a low side goes on");
 /// Advice on resistors.
-pub const PULLS: &str = "10 kOhm to 3.3 V at each low-side input, 10 kOhm to ground at each high-side input: those of the drivers are weak";
+pub const PULLS: &str = "10 kOhm to 3.3 V at each low-side input, 10 kOhm to ground at each high-side input, because the pull resistors inside the drivers are weak";
 
 /// Shunts below the low sides. Their amplifiers give `zero_v` without current and `v_per_a` more for each ampere into the motor, V.
 pub const fn shunts(v_per_a: Stated<f32>, zero_v: f32) -> Currents {

@@ -42,7 +42,7 @@ pub const BOARD: Board = Board {
         "comparator of the module at its shunts, at its shut-down and at the fault input",
         "ground SD/OD of the module: `status` must show the break",
     )),
-    pulls: "10 kOhm to ground at all six driver inputs: those of the module are weak",
+    pulls: "10 kOhm to ground at all six driver inputs, because the pull resistors inside the module are weak",
     // The same adapter, with its unknown pins for USART3, and a dc link of the same voltage.
     ..nucleo_g474re_ihm023v3::BOARD
 };

@@ -33,7 +33,7 @@ fn section(board: &Board) -> String {
     ]
     .into_iter()
     .chain(SCALES.into_iter().zip(&lines).map(|(name, line)| {
-        (name, format!("{:.3} mA a code, {:.3} A at code 0", line.gain * 1e3, line.offset))
+        (name, format!("{:.3} mA per ADC count, {:.3} A at count 0", line.gain * 1e3, line.offset))
     }))
     .chain(
         shunts.map(|shunts| {
@@ -41,7 +41,7 @@ fn section(board: &Board) -> String {
         }),
     )
     .chain([
-        ("scale of the dc link", format!("{:.3} V a code", board.dc_link.line.value.gain)),
+        ("scale of the dc link", format!("{:.3} V per ADC count", board.dc_link.line.value.gain)),
         ("maximum operating voltage", volts(board.dc_link_limits.operation.value)),
         ("switches withstand", volts(board.dc_link_limits.switches.value)),
         ("capacitors withstand", volts(board.dc_link_limits.capacitors.value)),
@@ -52,7 +52,7 @@ fn section(board: &Board) -> String {
     .chain([("thermistor", format!("{:.0} Ω at 25 °C", board.ntc.value.ohm_25))]);
     let sources = board.sources();
     let mut text = format!(
-        "## {}\n\n{}. High sides {}, low sides {}, fault input {}, currents {}, dc link {}, heat sink {}.\nNominal dc link {:.0} V. Resistors at the driver inputs: {}.\nPins that stay analog: {}.\n\n| item | value | source |\n|---|---|---|\n",
+        "## {}\n\n{}. High sides {}, low sides {}, fault input {}, currents {}, dc link {}, heat sink {}.\nNominal dc link {:.0} V. Resistors at the driver inputs: {}.\nPins that must stay analog, because the power stage drives them: {}.\n\n| item | value | source |\n|---|---|---|\n",
         board.name,
         board.title,
         list(&board.high.pins),

@@ -391,41 +391,41 @@ fn the_manual_lists_the_refusals() {
     let rows = [
         (
             Refusal::Authority(Commander::Console),
-            "the other side commands",
+            "another interface is in command: console or terminal strip",
             "`set bus.commands bus` at the console",
         ),
         (Refusal::MustBeOff, "the drive is not off", "write a stop first"),
         (
             Refusal::NotConfirmed,
             "the board is not confirmed",
-            "the bench steps that `board` lists, then `confirm board`, at the console",
+            "do the bench steps that `board` lists at the console, then type `confirm board`",
         ),
         (
             refused(Refused::NotLearned),
             "nothing is learned of this motor with these settings",
-            "lock the shaft, `learn` at the console",
+            "lock the shaft, and type `learn` at the console",
         ),
         (
             refused(Refused::Fault(Fault::Break)),
             "a fault is latched; `0x2100` has its number",
-            "bit 1 of `0x2002` clears it",
+            "remove the cause, and write 2 to `0x2002`",
         ),
         (
             Refusal::Design(range),
-            "a value, or the settings together, are not possible",
-            "`get` and `apply` at the console say which",
+            "a value is not possible, or the settings do not fit each other",
+            "`get` and `apply` at the console say which ones",
         ),
         (Refusal::Hardware(key), "a setting of the hardware", "set it at the console"),
         (Refusal::Flash(FlashError::Erase(0)), "the flash was not written", "save again"),
         (
             Refusal::Ended,
-            "a stop comes before a run: the drive has stopped for another reason, or the state of CiA 402 has no such transition",
-            "1 to `0x2000`, or 6 to `0x6040`",
+            "a stop has to be written first, because the drive has stopped for another reason, or because the state of CiA 402 has no such transition",
+            "write 1 to `0x2000`, or 6 to `0x6040`, and then the run",
         ),
         (
             Refusal::Command(CommandError::NoAnswer),
             "the control does not run",
-            "`version` and `faults` at the console",
+            "see the reason at the console: `version`, `faults`",
         ),
         (
             refused(Refused::NotCharged),
@@ -434,7 +434,7 @@ fn the_manual_lists_the_refusals() {
         ),
         (
             Refusal::Staged,
-            "staged values, or lines of another board",
+            "settings are staged and not in force, or the console has lines of another board",
             "`apply` or `revert` at the console",
         ),
         (
@@ -444,10 +444,10 @@ fn the_manual_lists_the_refusals() {
         ),
         (
             Refusal::Reference(""),
-            "the strip's reference was lost",
-            "RESET or `clear`, then a new start",
+            "the reference of the terminal strip was lost",
+            "close RESET or type `clear`, then start again",
         ),
-        (Refusal::Stopped, "a stop came before the start", "start again"),
+        (Refusal::Stopped, "a stop arrived while the start was being prepared", "start again"),
         (
             Refusal::TooOften(7),
             "three faults of the power stage within 10 s",
@@ -455,7 +455,7 @@ fn the_manual_lists_the_refusals() {
         ),
         (
             Refusal::Set(SetError::Loosens(key, key)),
-            "a setting that protects would become looser",
+            "a protection would become looser",
             "set it at the console",
         ),
     ];

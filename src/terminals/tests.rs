@@ -220,7 +220,7 @@ fn the_manual_lists_the_terminals() {
     use std::fmt::Write;
     let mut text = String::from("| terminal |");
     let with = || ALL.iter().filter(|board| board.terminals.pins.iter().any(Option::is_some));
-    with().for_each(|board| write!(text, " {} |", board.name).unwrap());
+    with().for_each(|board| write!(text, " board `{}` |", board.name).unwrap());
     write!(text, "\n|---|{}\n", "---|".repeat(with().count())).unwrap();
     for (n, name) in TERMINALS.into_iter().enumerate() {
         write!(text, "| {name} |").unwrap();

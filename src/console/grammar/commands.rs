@@ -67,7 +67,7 @@ commands! { words;
     8: "relock", ["", "drop the torque, magnetise again, verify the lock, continue"] => Order::Relock;
     9: "torque", ["A", "q-axis current, A peak"] => Order::Torque(words.number("the current, A")?);
     10: "speed", ["RPM", "speed, mechanical rpm"] => Order::Speed(words.number("the speed, rpm")?);
-    11: "jog", ["RPM", "turn at this speed while it is repeated every 0.5 s, then to rest by the ramp"] => Order::Jog(words.number("the speed, rpm")?);
+    11: "jog", ["RPM", "turn at this speed while you repeat this command every 0.5 s, then to rest by the ramp"] => Order::Jog(words.number("the speed, rpm")?);
     12: "position", ["TURNS", "position, mechanical turns from where it started"] => Order::Position(words.number("the position, turns")?);
     13: "home", ["RPM A TURNS", "in position mode: turn towards a stop, slowly, with at most this current and this far; the stop becomes position 0"] => Order::Home(homing::Plan {
         rpm: words.number("the speed, rpm")?,
@@ -100,7 +100,7 @@ commands! { words;
     25: "history", ["", "hours with power and with current, starts, and the last faults"] => Request::List(ListKind::History);
     26: "clear", ["", "clear the latched fault"] => Order::Clear;
     27: "trace",
-        ["N [DIVIDER] [NAME]", "record N periods, every DIVIDER-th, of the signals named; print as CSV"],
+        ["N [DIVIDER] [NAME]", "record N times, in every DIVIDER-th period, the signals named; print as CSV"],
         ["N ... on fault", "record until a fault; then `trace` prints it"],
         ["N ... on NAME above|below X", "record around the moment when the signal passes X"],
         ["[off]", "print the last trace, or end the recording"]
