@@ -166,7 +166,7 @@ impl fmt::Display for State {
             Self::Torque => "regulating torque",
             Self::Speed => "regulating speed",
             Self::Position => "regulating position",
-            Self::VoltsPerHertz => "turning by voltage and frequency",
+            Self::VoltsPerHertz => "turning by V/f control",
             Self::Learning => "learning",
             Self::Braking | Self::BrakingByFrequency => "braking to rest",
             Self::Stopping => "stopping",

@@ -140,7 +140,7 @@ fn rows() -> Vec<(&'static str, Vec<Bench>)> {
         ("regulating torque", vec![running(Mode::Torque)]),
         ("regulating speed", vec![running(Mode::Speed)]),
         ("regulating position", vec![running(Mode::Position)]),
-        ("turning by voltage and frequency", vec![turning(Mode::VoltsPerHertz)]),
+        ("turning by V/f control", vec![turning(Mode::VoltsPerHertz)]),
         ("learning", vec![running(Mode::Learning)]),
         ("exciting the motor at rest", vec![running(Mode::Commissioning)]),
         (
