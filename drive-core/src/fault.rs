@@ -50,7 +50,7 @@ faults! {
     OffsetA = 16, "offset of current sensor a out of range at start";
     OffsetB = 17, "offset of current sensor b out of range at start";
     OverTemperature = 18, "heat sink too hot";
-    Encoder = 19, "encoder jumped or stood still as the rotor cannot";
+    Encoder = 19, "encoder jumped or stopped in a way that the rotor cannot";
     Break = 20, "the power stage pulled the break input";
     AnalogWatchdog = 21, "over-current seen by the analog watchdog";
     DeadlineMiss = 22, "the control interrupt missed its deadline";
@@ -65,7 +65,7 @@ faults! {
     WiringPolarityA = 31, "wiring check: current sensor a is the wrong way round";
     WiringPolarityB = 32, "wiring check: current sensor b is the wrong way round";
     WiringExchanged = 33, "wiring check: current sensors or gates are on the wrong phases";
-    WiringCurrent = 34, "wiring check: more current than the motor's settings explain";
+    WiringCurrent = 34, "wiring check: more current than the settings of the motor can explain";
     CarrierNoRoom = 35, "the voltage left by the fundamental is too small for the injection";
     SensorNoisyA = 36, "current sensor a is too noisy for the injection";
     SensorNoisyB = 37, "current sensor b is too noisy for the injection";

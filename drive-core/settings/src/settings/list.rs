@@ -36,7 +36,7 @@ settings! {
         "motor.l_m" [motor] l_m: f32, 4: number("H").from_to(1e-6, 1000.0).learned();
         /// pole pairs
         "motor.pole_pairs" [motor] pole_pairs: u8, 5: whole().from_to(1.0, 6.0).learned();
-        /// inertia of rotor and load, for the speed loop; auto: 0.15 s of rated torque to rated speed, until `commission inertia`
+        /// inertia of rotor and load, for the speed loop; auto: rated speed after 0.15 s of rated torque, until `commission inertia`
         "motor.inertia" [] inertia: Option<f32>, 6: auto("kg m2", Settings::inertia).from_to(1e-7, 1000.0);
     ];
 
@@ -44,7 +44,7 @@ settings! {
     MotorSensor "motor." [motor_sensor] {
         /// temperature sensor of the motor
         sensor: SensorKind = SensorKind::None, 122: word().guarded(Guard::Keep);
-        /// resistor between that sensor and the reference of the ADC
+        /// resistor between the temperature sensor of the motor and the reference of the ADC
         sensor_ohm: f32 = 4700.0, 123: number("ohm").from_to(100.0, 1e6).hardware();
         /// band below `motor.sensor_trip_c`, K, in which the torque falls to zero
         sensor_band_k: u8 = 20, 124: whole().from_to(1.0, 100.0);
@@ -59,7 +59,7 @@ settings! {
         power_w: f32 = 1100.0, 7: number("W").from_to(50.0, 30_000.0);
         /// rated voltage between lines, rms
         voltage_v: f32 = 380.0, 8: number("V").from_to(24.0, 690.0);
-        /// rated current of a line, rms; the rules take their currents from it
+        /// rated line current, rms; the `auto` rules derive the current limits from it
         current_a: f32 = 2.56, 9: number("A").from_to(0.05, 1000.0);
         /// rated frequency
         frequency_hz: f32 = 60.0, 10: number("Hz").from_to(25.0, 400.0);
@@ -78,7 +78,7 @@ settings! {
         dead_time_s: f32 = 2.2e-6, 13: number("s").from_to(0.0, 6e-6).changed(Change::FromReset).learned().hardware();
         /// whether the dead time is compensated
         compensate: bool = true, 14: word().learned();
-        /// phase current from which on the compensation is full
+        /// phase current above which the dead-time compensation acts in full
         ///
         /// The rule gives three times the spread of noise and prediction.
         full_compensation_a: Option<f32> = None, 15: auto("A", full_compensation_a: |s| s.share_of_range(0.03)).from_to(1e-4, 100.0).learned();
