@@ -57,7 +57,7 @@ fn page(table: &Table) -> String {
         for step in &part.steps {
             number += 1;
             let acts: Vec<_> = step.acts.iter().map(|act| shown(act, board)).collect();
-            // What a person does and then expects is one round; with several rounds each has its number in both columns.
+            // A round is what a person does and then expects; with several rounds each has its number in both columns.
             let mut rounds = vec![[Vec::new(), Vec::new()]];
             for (expect, text) in &acts {
                 if !expect && rounds.last().is_some_and(|[_, seen]| !seen.is_empty()) {
