@@ -90,7 +90,7 @@ fn the_figures_are_those_of_the_runs() {
     let [load, reversal, warm] = numbers("perturbation", 1, steps);
     let figures = page("docs/performance.md");
     for row in [
-        format!("(delays left in: up to {left_in:.1}°)"),
+        format!("(up to {left_in:.1}° without the compensation of the delays)"),
         format!("encoder | within {torque:.2} % |"),
         format!("{plain:.1} % without compensation, {compensated:.2} % with it"),
         format!("≤ {:.0} µA rms, {:.0} µA peak", rms * 1e6, peak * 1e6),
