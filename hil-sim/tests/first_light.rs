@@ -68,7 +68,8 @@ fn page(table: &Table) -> String {
             let column = |wanted: bool| {
                 let filled = rounds.iter().enumerate().filter_map(|(n, round)| {
                     let text = round[usize::from(wanted)].join("; ");
-                    let number = if rounds.len() > 1 { format!("({}) ", n + 1) } else { "".into() };
+                    let number =
+                        if rounds.len() > 1 { format!("({}) ", n + 1) } else { String::new() };
                     (!text.is_empty()).then(|| number + &text)
                 });
                 filled.collect::<Vec<_>>().join("<br>")
