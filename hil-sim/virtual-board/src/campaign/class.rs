@@ -108,26 +108,27 @@ impl Class {
     /// The class has no injection.
     pub fn inject(&self, board: &mut Board, target: &Target, rng: &mut dyn Rng) -> Result<String> {
         let addresses = &target.addresses;
-        Ok(match self.name.as_str() {
-            "nothing (for comparison)" => String::new(),
+        let mut what = String::new();
+        match self.name.as_str() {
+            "nothing (for comparison)" => {}
             "current sensor stuck" => {
                 let (which, now) = (target.any_current(rng), board.sample());
                 let value = *current(which, &mut { now });
                 board.disturb = Some(Box::new(move |s| *current(which, s) = value));
-                format!("{} at {value}", name(which))
+                what = format!("{} at {value}", name(which));
             }
             "current sensor open" => {
                 let which = target.any_current(rng);
                 let line = target.line(which);
                 let zero = (-line.offset / line.gain).round() as u16;
                 board.disturb = Some(Box::new(move |s| *current(which, s) = zero));
-                name(which).into()
+                what = name(which).into();
             }
             "current sensor saturated" => {
                 let (which, high) = (target.any_current(rng), rng.random::<bool>());
                 let code = if high { firmware_board::ADC_FULL_SCALE } else { 0 };
                 board.disturb = Some(Box::new(move |s| *current(which, s) = code));
-                format!("{} at {code}", name(which))
+                what = format!("{} at {code}", name(which));
             }
             "current sensor noisy" => {
                 let which = target.any_current(rng);
@@ -136,13 +137,13 @@ impl Class {
                 let codes = amperes / f64::from(target.line(which).gain.abs());
                 let mut noise = noise(rng, codes);
                 board.disturb = Some(Box::new(move |s| noise(current(which, s))));
-                format!("{}, {:.1} mA", name(which), 1e3 * amperes)
+                what = format!("{}, {:.1} mA", name(which), 1e3 * amperes);
             }
             "dc-link sensor stuck, open, saturated, noisy" => {
-                slow_sensor(board, rng, |s| &mut s.dc_link)
+                what = slow_sensor(board, rng, |s| &mut s.dc_link);
             }
             "heat-sink sensor stuck, open, saturated, noisy" => {
-                slow_sensor(board, rng, |s| &mut s.heat_sink)
+                what = slow_sensor(board, rng, |s| &mut s.heat_sink);
             }
             "not-a-number in the drive's state" => {
                 let Region { address: base, size } = addresses.state;
@@ -156,62 +157,50 @@ impl Class {
                         return Ok(format!("word {word} of the control's state"));
                     }
                 }
-                "no such word".into()
+                what = "no such word".into();
             }
             "dc-link step" => {
                 // Values for a dc link of 311 V.
                 let volts = target.relative_voltage * rng.random_range(100.0..600.0);
                 board.plant.set_dc_link(volts).ok();
-                format!("to {volts:.0} V")
+                what = format!("to {volts:.0} V");
             }
-            "encoder stands still" => {
-                board.plant.set_encoder_fault(EncoderFault::Stuck);
-                String::new()
-            }
+            "encoder stands still" => board.plant.set_encoder_fault(EncoderFault::Stuck),
             "encoder loses counts of up to 6 rpm" => {
-                losing(board, rng.random_range(0.0..6.0) / target.encoder_rpm)
+                what = losing(board, rng.random_range(0.0..6.0) / target.encoder_rpm);
             }
             "encoder loses 5 to 90 % of its counts at 900 rpm and more" => {
-                losing(board, rng.random_range(0.05..0.9))
+                what = losing(board, rng.random_range(0.05..0.9));
             }
             "encoder loses 2 to 90 % of its counts at 300 rpm" => {
-                losing(board, rng.random_range(0.02..0.9))
+                what = losing(board, rng.random_range(0.02..0.9));
             }
-            "break pin" => {
-                board.set_fault_pin(false);
-                String::new()
-            }
-            "clock failure" => {
-                board.set_crystal(false);
-                String::new()
-            }
-            "flash ECC in code" => bad_code(board, rng),
-            "bit flip in the coefficients" => flip(board, rng, addresses.coefficients),
-            "bit flip in a register" => flip_register(board, rng),
-            "bit flip in the drive's state" => flip(board, rng, addresses.state),
-            "bit flip in the control's code" => flip(board, rng, target.code),
-            "bit flip anywhere in the control's data" => flip(board, rng, addresses.control),
+            "break pin" => board.set_fault_pin(false),
+            "clock failure" => board.set_crystal(false),
+            "flash ECC in code" => what = bad_code(board, rng),
+            "bit flip in the coefficients" => what = flip(board, rng, addresses.coefficients),
+            "bit flip in a register" => what = flip_register(board, rng),
+            "bit flip in the drive's state" => what = flip(board, rng, addresses.state),
+            "bit flip in the control's code" => what = flip(board, rng, target.code),
+            "bit flip anywhere in the control's data" => what = flip(board, rng, addresses.control),
             "bit flip in RAM, stack included" => {
                 let stack = Region { address: target.stack.end() - 1024, size: 1024 };
                 let area = if rng.random() { target.data } else { stack };
-                flip(board, rng, area)
+                what = flip(board, rng, area);
             }
             "timer update dropped" => {
                 let count = rng.random_range(1..6);
                 board.chip().tim1.drop_update = count;
-                format!("{count} of them")
+                what = format!("{count} of them");
             }
-            "timer update duplicated" => {
-                board.chip().tim1.extra_update();
-                String::new()
-            }
+            "timer update duplicated" => board.chip().tim1.extra_update(),
             "conversion trigger lost" => {
                 let which = rng.random_range(0..3_usize);
                 // Permanently, or for a while that may be longer than the watchdog waits.
                 let for_good = rng.random_range(0..4) == 0;
                 let count = if for_good { u32::MAX } else { rng.random_range(1..40) };
                 board.chip().adc.lose_triggers = [[count, 0], [0, count], [count, count]][which];
-                format!("{} of them, {}", count, ["one", "two", "both"][which])
+                what = format!("{} of them, {}", count, ["one", "two", "both"][which]);
             }
             "console garbage and floods" => {
                 let mut bytes = vec![0; rng.random_range(1..3000)];
@@ -220,43 +209,40 @@ impl Class {
                     *byte = if text { TEXT[rng.random_range(0..TEXT.len())] } else { rng.random() };
                 }
                 board.send(&bytes);
-                format!("{} bytes{}", bytes.len(), if text { " of text" } else { "" })
+                what = format!("{} bytes{}", bytes.len(), if text { " of text" } else { "" });
             }
             "interrupt overrun" => {
                 let ms = rng.random_range(0.005..OVERRUN_MS);
                 board.stall((ms * 1e-3 * TICKS_PER_S as f64) as u64);
-                format!("{ms:.3} ms")
+                what = format!("{ms:.3} ms");
             }
             "LSI off its frequency" => {
                 let hz = [0.0, rng.random_range(8e3..28e3), rng.random_range(36e3..60e3)];
-                set_clocks(board, 0.0, hz[rng.random_range(0..3_usize)])
+                what = set_clocks(board, 0.0, hz[rng.random_range(0..3_usize)]);
             }
             "crystal off its frequency" => {
                 let error = rng.random_range(0.12..0.3);
-                set_clocks(board, if rng.random() { error } else { -error }, LSI_HZ)
+                what = set_clocks(board, if rng.random() { error } else { -error }, LSI_HZ);
             }
             "reference voltage off" => {
                 let error = rng.random_range(0.035..0.1);
                 let error = if rng.random() { error } else { -error };
                 board.chip().set_reference(error);
-                format!("{:.1} %", 100.0 * error)
+                what = format!("{:.1} %", 100.0 * error);
             }
             "TIM1 stops" => {
                 let cr1 = board.chip().read(TIM1_CR1, 4);
                 board.chip().write(TIM1_CR1, 4, cr1 & !1);
-                String::new()
             }
-            "core hangs" => {
-                board.hang();
-                String::new()
-            }
+            "core hangs" => board.hang(),
             "stack overflow" => {
                 let room = 8 * rng.random_range(0..13);
                 board.cpu.set(Register::SP, target.stack.address + room);
-                format!("room for {room} bytes")
+                what = format!("room for {room} bytes");
             }
             other => bail!("{other}: a class without an injection"),
-        })
+        }
+        Ok(what)
     }
 }
 
