@@ -20,7 +20,7 @@
 
 use crate::complex::{Complex, dot, square};
 use crate::error::{PlantError, check};
-use crate::model::{ElectricalRate, ElectricalState, MachineModel, increment};
+use crate::model::{ElectricalRate, ElectricalState, MachineModel, integrated};
 use crate::settings::settings;
 
 /// Largest magnitude of the saliency vector that settings may reach.
@@ -107,20 +107,7 @@ impl ElectricalState for MachineState {
         self.psi
     }
 
-    #[inline]
-    fn set_moved(&mut self, x: &Self, k: &Self, h: f64) {
-        *self = Self { i: x.i + k.i * h, psi: x.psi + k.psi * h, i_lp: x.i_lp + k.i_lp * h };
-    }
-
-    #[inline]
-    fn set_advanced(&mut self, x: &Self, k: [&Self; 4], h: f64) {
-        let sixth = h * (1.0 / 6.0);
-        *self = Self {
-            i: x.i + increment(k.map(|k| k.i), sixth),
-            psi: x.psi + increment(k.map(|k| k.psi), sixth),
-            i_lp: x.i_lp + increment(k.map(|k| k.i_lp), sixth),
-        };
-    }
+    integrated!(Self: i = i, psi = psi, i_lp = i_lp);
 }
 
 /// Coefficients of the machine equations.

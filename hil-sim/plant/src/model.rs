@@ -87,8 +87,22 @@ pub trait ElectricalRate {
     fn current_rate(&self) -> Complex;
 }
 
-/// Returns `(k0 + 2 k1 + 2 k2 + k3) sixth`, the increment of the Runge-Kutta method.
-#[inline]
-pub(crate) fn increment(k: [Complex; 4], sixth: f64) -> Complex {
-    (k[0] + k[3] + (k[1] + k[2]) * 2.0) * sixth
+/// Defines how a state follows its rates: its places, each with the field of the rate.
+macro_rules! integrated {
+    ($rate:ty: $($($place:ident).+ = $of:ident),+) => {
+        #[inline(always)]
+        fn set_moved(&mut self, x: &Self, k: &$rate, h: f64) {
+            $(self.$($place).+ = x.$($place).+ + k.$of * h;)+
+        }
+
+        #[inline(always)]
+        fn set_advanced(&mut self, x: &Self, k: [&$rate; 4], h: f64) {
+            let sixth = h * (1.0 / 6.0);
+            $(
+                let sum = k[0].$of + k[3].$of + (k[1].$of + k[2].$of) * 2.0;
+                self.$($place).+ = x.$($place).+ + sum * sixth;
+            )+
+        }
+    };
 }
+pub(crate) use integrated;

@@ -2,7 +2,7 @@
 
 use super::magnetics::Solution;
 use crate::complex::Complex;
-use crate::model::{ElectricalRate, ElectricalState, increment};
+use crate::model::{ElectricalRate, ElectricalState, integrated};
 
 /// Electrical state of the energy model. Fluxes are integrated; currents follow from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -78,29 +78,7 @@ impl ElectricalState for EnergyState {
         self.psi_r
     }
 
-    #[inline(always)]
-    fn set_moved(&mut self, x: &Self, k: &EnergyRate, h: f64) {
-        self.psi_s = x.psi_s + k.psi_s * h;
-        self.psi_r = x.psi_r + k.psi_r * h;
-        self.psi_deep = x.psi_deep + k.psi_deep * h;
-        self.psi_iron = x.psi_iron + k.psi_iron * h;
-        self.theta = x.theta + k.theta * h;
-        self.solution.slots = x.solution.slots + k.slots * h;
-        // `correct` sets the rotor current and the derivatives.
-        self.solution.m = x.solution.m + k.m * h;
-        self.solution.i = x.solution.i + k.i * h;
-    }
-
-    #[inline(always)]
-    fn set_advanced(&mut self, x: &Self, k: [&EnergyRate; 4], h: f64) {
-        let sixth = h * (1.0 / 6.0);
-        self.psi_s = x.psi_s + increment(k.map(|k| k.psi_s), sixth);
-        self.psi_r = x.psi_r + increment(k.map(|k| k.psi_r), sixth);
-        self.psi_deep = x.psi_deep + increment(k.map(|k| k.psi_deep), sixth);
-        self.psi_iron = x.psi_iron + increment(k.map(|k| k.psi_iron), sixth);
-        self.theta = x.theta + (k[0].theta + k[3].theta + (k[1].theta + k[2].theta) * 2.0) * sixth;
-        self.solution.slots = x.solution.slots + increment(k.map(|k| k.slots), sixth);
-        self.solution.m = x.solution.m + increment(k.map(|k| k.m), sixth);
-        self.solution.i = x.solution.i + increment(k.map(|k| k.i), sixth);
-    }
+    // `correct` sets the rotor current and the derivatives.
+    integrated!(EnergyRate: psi_s = psi_s, psi_r = psi_r, psi_deep = psi_deep, psi_iron = psi_iron, theta = theta,
+        solution.slots = slots, solution.m = m, solution.i = i);
 }
