@@ -13,7 +13,6 @@ use serde_json::Value;
 
 pub use header::Header;
 
-use crate::experiments::statistics::Statistical;
 use crate::prelude::*;
 
 /// A run and its record.
@@ -24,28 +23,6 @@ pub struct Run {
     pub run: usize,
     /// Its record.
     pub record: Value,
-}
-
-/// Does the runs of an experiment that are not stored yet, and returns the records of all runs in their order.
-///
-/// # Errors
-/// The errors of the experiment; [`Error::Write`] if the journal cannot be written.
-pub fn records(
-    statistical: &Statistical,
-    context: &Context<'_>,
-    journal: &Journal,
-) -> Result<Vec<Value>, Error> {
-    let missing: Vec<usize> =
-        (0..journal.count).filter(|run| !journal.runs.contains_key(run)).collect();
-    let done = Mutex::new(journal.runs.clone());
-    (statistical.some)(context, &missing, &|run, record| {
-        let run = Run { run, record };
-        journal.append(&run)?;
-        done.lock().unwrap_or_else(PoisonError::into_inner).insert(run.run, run.record);
-        Ok(())
-    })?;
-    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-    Ok(done.into_values().collect())
 }
 
 /// The contents of a file.
@@ -108,8 +85,6 @@ impl Lines {
 pub struct Journal {
     /// Its path.
     pub path: PathBuf,
-    /// Number of runs of the experiment.
-    pub count: usize,
     /// The runs that were stored when it was opened.
     pub runs: BTreeMap<usize, Value>,
     /// Number of the line that was torn.
@@ -145,7 +120,7 @@ impl Journal {
             file.write_all(&line(header)?).map_err(Error::write(path))?;
         }
         let runs = runs.into_iter().map(|run| (run.run, run.record)).collect();
-        Ok(Self { path: path.to_owned(), count: header.runs, file: Mutex::new(file), runs, torn })
+        Ok(Self { path: path.to_owned(), file: Mutex::new(file), runs, torn })
     }
 
     /// Adds a run at once.

@@ -6,9 +6,10 @@ pub mod fault_code;
 use crate::context::Context;
 use crate::error::Error;
 use crate::outcome::Outcome;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize as _, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// A statistical experiment.
 pub trait Study: Sized + Sync {
@@ -18,14 +19,11 @@ pub trait Study: Sized + Sync {
     /// Name of the experiment on the command line.
     const NAME: &'static str;
 
-    /// Plans the runs.
+    /// Plans the runs, and returns their number.
     ///
     /// # Errors
     /// If the configuration is refused.
-    fn new(context: &Context<'_>) -> Result<Self, Error>;
-
-    /// Returns the number of runs.
-    fn runs(&self) -> usize;
+    fn new(context: &Context<'_>) -> Result<(Self, usize), Error>;
 
     /// Does one of the runs, counted from 0. It does not depend on the other runs.
     ///
@@ -62,8 +60,8 @@ pub fn seed_of(seed: u64, number: usize) -> u64 {
 /// # Errors
 /// The errors of the study.
 pub fn whole<S: Study>(context: &Context<'_>) -> Result<Outcome, Error> {
-    let study = S::new(context)?;
-    let numbers: Vec<usize> = (0..study.runs()).collect();
+    let (study, runs) = S::new(context)?;
+    let numbers: Vec<usize> = (0..runs).collect();
     let records = context.in_parallel(S::NAME, &numbers, |_, &number| study.run(number))?;
     study.outcome(context, records)
 }
@@ -75,23 +73,35 @@ pub type Keep<'a> = &'a (dyn Fn(usize, Value) -> Result<(), Error> + Sync);
 pub struct Statistical {
     /// Returns the number of its runs.
     pub runs: fn(&Context<'_>) -> Result<usize, Error>,
-    /// Does these runs on all cores and passes each record on as soon as it is complete.
-    pub some: fn(&Context<'_>, &[usize], Keep<'_>) -> Result<(), Error>,
-    /// Computes the outcome of all runs, in their order.
-    pub outcome: fn(&Context<'_>, Vec<Value>) -> Result<Outcome, Error>,
+    /// Does the runs that have no stored record on all cores, passes each record on as soon as it is complete, and computes the
+    /// outcome of all runs.
+    pub resumed: fn(&Context<'_>, &BTreeMap<usize, Value>, Keep<'_>) -> Result<Outcome, Error>,
 }
 
 impl Statistical {
     /// Makes the runs of a study.
     pub fn of<S: Study>() -> Self {
-        Self { runs: |context| Ok(S::new(context)?.runs()), some: some::<S>, outcome: outcome::<S> }
+        Self { runs: |context| Ok(S::new(context)?.1), resumed: resumed::<S> }
     }
 }
 
-fn some<S: Study>(context: &Context<'_>, numbers: &[usize], keep: Keep<'_>) -> Result<(), Error> {
-    let study = S::new(context)?;
-    let one = |_, &number: &usize| keep(number, value::<S>(number, &study.run(number)?)?);
-    context.in_parallel(S::NAME, numbers, one).map(|_: Vec<()>| ())
+fn resumed<S: Study>(
+    context: &Context<'_>,
+    stored: &BTreeMap<usize, Value>,
+    keep: Keep<'_>,
+) -> Result<Outcome, Error> {
+    let (study, runs) = S::new(context)?;
+    let numbers: Vec<usize> = (0..runs).collect();
+    let records = context.in_parallel(S::NAME, &numbers, |_, &number| {
+        if let Some(record) = stored.get(&number) {
+            return S::Record::deserialize(record)
+                .map_err(|e| Error::Refused(format!("the record of run {number}: {e}")));
+        }
+        let record = study.run(number)?;
+        keep(number, value::<S>(number, &record)?)?;
+        Ok(record)
+    })?;
+    study.outcome(context, records)
 }
 
 /// Converts a record to JSON, after a check that it is read back unchanged.
@@ -103,13 +113,4 @@ fn value<S: Study>(number: usize, record: &S::Record) -> Result<Value, Error> {
         .map_err(lost)?;
     let changes = || Error::Internal(format!("the record of run {number} changes: {again}"));
     if again == value { Ok(value) } else { Err(changes()) }
-}
-
-fn outcome<S: Study>(context: &Context<'_>, values: Vec<Value>) -> Result<Outcome, Error> {
-    let record = |(number, value)| {
-        serde_json::from_value(value)
-            .map_err(|e| Error::Refused(format!("the record of run {number}: {e}")))
-    };
-    let records = values.into_iter().enumerate().map(record).collect::<Result<_, _>>()?;
-    S::new(context)?.outcome(context, records)
 }

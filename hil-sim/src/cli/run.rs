@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use serde_json::Value;
 use trace::Voltages;
 
 use super::{say, used};
@@ -10,7 +11,7 @@ use crate::config::motors::Motor;
 use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, TRACE, identify_trace as trace, scenario};
 use crate::first_light;
-use crate::journal::{self, Header, Journal};
+use crate::journal::{Header, Journal, Run as Kept};
 use crate::outcome::{self, Origin};
 use crate::passport;
 use crate::prelude::*;
@@ -208,7 +209,7 @@ fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
 /// Runs a statistical experiment whose finished runs are in a file.
 ///
 /// # Errors
-/// As [`experiments::statistical`], [`Journal::open`] and [`journal::records`].
+/// As [`experiments::statistical`], [`Journal::open`] and [`Statistical::resumed`](experiments::statistics::Statistical::resumed).
 fn resumed(
     path: &Path,
     experiment: &Experiment,
@@ -229,8 +230,8 @@ fn resumed(
     if done > 0 && !quiet {
         eprintln!("note: {done} of {all} runs are stored already");
     }
-    let records = journal::records(statistical, context, &journal)?;
-    let outcome = (statistical.outcome)(context, records)?;
+    let keep = |run, record: Value| journal.append(&Kept { run, record });
+    let outcome = (statistical.resumed)(context, &journal.runs, &keep)?;
     Ok(experiment.remarked(outcome, context.config))
 }
 

@@ -47,7 +47,6 @@ pub struct Battery {
     after: Config,
     seed: u64,
     kinds: Vec<Kind>,
-    runs: usize,
     /// The drive of each group.
     drives: Vec<OnceLock<Learnt>>,
 }
@@ -98,18 +97,14 @@ impl Study for Battery {
     type Record = Trial;
     const NAME: &'static str = "battery";
 
-    fn new(context: &Context<'_>) -> Result<Self, Error> {
+    fn new(context: &Context<'_>) -> Result<(Self, usize), Error> {
         let config = context.config.clone();
         check_model(&config)?;
         let after = config.after_learning()?;
         let (kinds, runs) = chosen(&config);
         let runs = config.extent.runs.map_or(runs, |runs| runs as usize);
         let drives = std::iter::repeat_with(OnceLock::new).take(runs.div_ceil(GROUP)).collect();
-        Ok(Self { config, after, seed: context.seed, kinds, runs, drives })
-    }
-
-    fn runs(&self) -> usize {
-        self.runs
+        Ok((Self { config, after, seed: context.seed, kinds, drives }, runs))
     }
 
     fn run(&self, number: usize) -> Result<Trial, Error> {

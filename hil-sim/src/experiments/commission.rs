@@ -141,16 +141,12 @@ impl Study for Commission {
     type Record = Record;
     const NAME: &'static str = "commission";
 
-    fn new(context: &Context<'_>) -> Result<Self, Error> {
+    fn new(context: &Context<'_>) -> Result<(Self, usize), Error> {
         let mut config = context.config.clone();
         let after = config.prepare.learn.then(|| context.seconds.unwrap_or(RUN_S));
         config.prepare.learn = false;
         let machines = config.extent.runs.map(|runs| runs as usize);
-        Ok(Self { config, seed: context.seed, machines, after })
-    }
-
-    fn runs(&self) -> usize {
-        self.machines.unwrap_or(1)
+        Ok((Self { config, seed: context.seed, machines, after }, machines.unwrap_or(1)))
     }
 
     fn run(&self, number: usize) -> Result<Record, Error> {

@@ -42,7 +42,6 @@ const UNNAMED: [Fault; 10] = [
 /// The random motors.
 pub struct ForeignMotors {
     seed: u64,
-    runs: usize,
 }
 
 /// A line of the verdict: its name, the motors among which it counts, and the condition.
@@ -234,12 +233,9 @@ impl Study for ForeignMotors {
     type Record = Record;
     const NAME: &'static str = "foreign-motors";
 
-    fn new(context: &Context<'_>) -> Result<Self, Error> {
-        Ok(Self { seed: context.seed, runs: context.config.extent.runs.unwrap_or(RUNS) as usize })
-    }
-
-    fn runs(&self) -> usize {
-        self.runs
+    fn new(context: &Context<'_>) -> Result<(Self, usize), Error> {
+        let runs = context.config.extent.runs.unwrap_or(RUNS) as usize;
+        Ok((Self { seed: context.seed }, runs))
     }
 
     fn run(&self, number: usize) -> Result<Record, Error> {

@@ -114,7 +114,7 @@ impl Study for FullRange {
     type Record = Trial;
     const NAME: &'static str = "full-range";
 
-    fn new(context: &Context<'_>) -> Result<Self, Error> {
+    fn new(context: &Context<'_>) -> Result<(Self, usize), Error> {
         let mut config = for_the_range(context.config)?;
         if config.prepare.commission {
             config.drive = commissioned(&config, context.seed)?;
@@ -125,12 +125,8 @@ impl Study for FullRange {
             Some(index) => vec![index as usize],
             None => (0..each * cases.len()).collect(),
         };
-        let drives = std::array::from_fn(|_| OnceLock::new());
-        Ok(Self { config, seed: context.seed, cases, numbers, drives })
-    }
-
-    fn runs(&self) -> usize {
-        self.numbers.len()
+        let (runs, drives) = (numbers.len(), std::array::from_fn(|_| OnceLock::new()));
+        Ok((Self { config, seed: context.seed, cases, numbers, drives }, runs))
     }
 
     fn run(&self, place: usize) -> Result<Trial, Error> {

@@ -32,15 +32,13 @@ impl Study for LockMonitor {
     type Record = Trial;
     const NAME: &'static str = "lock-monitor";
 
-    fn new(context: &Context<'_>) -> Result<Self, Error> {
+    fn new(context: &Context<'_>) -> Result<(Self, usize), Error> {
         let config = context.config.clone();
         let runs = config.extent.runs.unwrap_or(RUNS) as usize;
-        Ok(Self { config, seed: context.seed, runs })
-    }
-
-    fn runs(&self) -> usize {
-        let forced = OFFSETS.len() * self.runs;
-        forced + self.healthy_runs() + self.runs + 2 * START_RPM.len() * self.starts_each()
+        let all = Self { config, seed: context.seed, runs };
+        let starts = 2 * START_RPM.len() * all.starts_each();
+        let runs = OFFSETS.len() * runs + all.healthy_runs() + runs + starts;
+        Ok((all, runs))
     }
 
     fn run(&self, number: usize) -> Result<Trial, Error> {

@@ -110,16 +110,13 @@ impl Study for Machines {
     type Record = Result<Vec<SteadyRun>, String>;
     const NAME: &'static str = "machines";
 
-    fn new(context: &Context<'_>) -> Result<Self, Error> {
+    fn new(context: &Context<'_>) -> Result<(Self, usize), Error> {
         let mut config = context.config.clone();
         config.prepare.learn = true;
         let draws = config.spread.machine > 1.0;
         let seconds = context.seconds.unwrap_or(RUN_S);
-        Ok(Self { config, seed: context.seed, seconds, draws })
-    }
-
-    fn runs(&self) -> usize {
-        if self.draws { self.config.extent.runs.unwrap_or(MACHINES) as usize } else { 1 }
+        let runs = if draws { config.extent.runs.unwrap_or(MACHINES) as usize } else { 1 };
+        Ok((Self { config, seed: context.seed, seconds, draws }, runs))
     }
 
     fn run(&self, number: usize) -> Result<Self::Record, Error> {

@@ -24,15 +24,12 @@ impl Study for MonteCarlo {
     type Record = SteadyRun;
     const NAME: &'static str = "monte-carlo";
 
-    fn new(context: &Context<'_>) -> Result<Self, Error> {
+    fn new(context: &Context<'_>) -> Result<(Self, usize), Error> {
         let config = context.config.clone();
         let bound = config.load.speed_rpm.abs();
         let bound = if bound > 0.0 { bound } else { config.rpm(SPEED_RPM) };
-        Ok(Self { config, seed: context.seed, seconds: context.seconds.unwrap_or(2.0), bound })
-    }
-
-    fn runs(&self) -> usize {
-        self.config.extent.runs.unwrap_or(RUNS) as usize
+        let (runs, seconds) = (config.extent.runs.unwrap_or(RUNS), context.seconds.unwrap_or(2.0));
+        Ok((Self { config, seed: context.seed, seconds, bound }, runs as usize))
     }
 
     fn run(&self, number: usize) -> Result<SteadyRun, Error> {

@@ -118,15 +118,11 @@ impl Study for Refusals {
     type Record = Record;
     const NAME: &'static str = "commission-refusals";
 
-    fn new(context: &Context<'_>) -> Result<Self, Error> {
+    fn new(context: &Context<'_>) -> Result<(Self, usize), Error> {
         let mut config = context.config.clone();
         config.prepare.learn = false;
         let runs = config.extent.runs.unwrap_or(RUNS) as usize;
-        Ok(Self { config, seed: context.seed, runs })
-    }
-
-    fn runs(&self) -> usize {
-        DEFECTS.len() * self.runs
+        Ok((Self { config, seed: context.seed, runs }, DEFECTS.len() * runs))
     }
 
     fn run(&self, number: usize) -> Result<Record, Error> {
