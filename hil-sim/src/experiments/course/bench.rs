@@ -190,44 +190,38 @@ impl<'a> Bench<'a> {
     /// Makes a change, as far as it is in this one of all steps; returns whether the course goes on.
     fn change(&mut self, change: Change, n: f64, steps: f64) -> Result<bool, Error> {
         let (config, plant) = (self.config, &mut self.rig.plant);
-        let done = match change {
+        match change {
             Change::Flux(degrees) if n == 1.0 => {
                 // From now on the error is no longer counted, and the durations for which angle and flux are off start again.
                 plant.turn_rotor_flux(degrees.to_radians());
                 (self.turned, self.counted_from) = (true, None);
                 self.lasting = Default::default();
-                Ok(())
             }
-            Change::Mains(volts) => plant.set_mains(volts),
-            Change::Shaft(rpm) => {
-                self.rig.turn(config.rpm(rpm.after(n, steps)))?;
-                Ok(())
-            }
+            Change::Mains(volts) => plant.set_mains(volts).map_err(Error::refused)?,
+            Change::Shaft(rpm) => self.rig.turn(config.rpm(rpm.after(n, steps)))?,
             Change::DcLink(share) => {
-                plant.set_dc_link(config.inverter.dc_link_v * share.after(n, steps))
+                let volts = config.inverter.dc_link_v * share.after(n, steps);
+                plant.set_dc_link(volts).map_err(Error::refused)?;
             }
             Change::Warming(stator, rotor) => {
                 let (machine, share) = (plant_settings(config).machine, n / steps);
                 let warmer = |ohm: f64, rise: f64| ohm * (1.0 + rise * share);
-                plant.set_resistances(warmer(machine.rs, stator), warmer(machine.rr, rotor))
+                let (stator, rotor) = (warmer(machine.rs, stator), warmer(machine.rr, rotor));
+                plant.set_resistances(stator, rotor).map_err(Error::refused)?;
             }
-            Change::Start => return self.bring_up().map(|()| true),
+            Change::Start => self.bring_up()?,
             Change::FlyingStart(rpm) => return self.flying_start(config.rpm(rpm)),
             Change::Coast(seconds) => {
                 // A drive that has stopped itself refuses this command.
                 let _ = self.rig.command(&Command::Stop(Stop::Coast));
                 self.rig.wait_until(LONGEST_COAST_S, State::is_off);
                 self.rig.wait(seconds);
-                Ok(())
             }
             Change::Brake => return self.brake(),
-            Change::Count(seconds) => {
-                self.count_after(seconds);
-                Ok(())
-            }
-            Change::Nothing | Change::Flux(_) => Ok(()),
-        };
-        done.map(|()| true).map_err(Error::refused)
+            Change::Count(seconds) => self.count_after(seconds),
+            Change::Nothing | Change::Flux(_) => {}
+        }
+        Ok(true)
     }
 
     /// Starts while a dynamometer turns the shaft, rpm; returns whether the drive has found the flux.
