@@ -33,8 +33,8 @@ impl Bode<'_> {
         &self,
         responses: impl IntoIterator<Item = (N, F)>,
     ) -> (Panel, Panel) {
-        let mut gain = Panel::new(self.label, "gain (dB)").log_x();
-        let mut phase = Panel::new(self.label, "phase (°)").log_x();
+        let axes = |y| Panel { log_x: true, ..Panel::new(self.label, y) };
+        let (mut gain, mut phase) = (axes("gain (dB)"), axes("phase (°)"));
         for (name, response) in responses {
             let values: Vec<Complex64> = self.hz.iter().map(|&hz| response(omega_t(hz))).collect();
             let (name, decibels) = (name.as_ref(), values.iter().map(|h| decibels(*h)));

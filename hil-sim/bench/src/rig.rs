@@ -108,18 +108,9 @@ impl Rig {
 
     /// Connects a drive that is off to a motor at rest, both made by the caller.
     pub fn of(plant: Plant, drive: Drive) -> Self {
-        let (front_end, v) = (FrontEndState::default(), plant.dc_link());
-        let (peak_a, dc_link_v) = (0.0, (v, v));
-        Self {
-            plant,
-            drive,
-            front_end,
-            periods: 0,
-            peak_a,
-            dc_link_v,
-            trace: None,
-            learning_s: 0.0,
-        }
+        let (front_end, trace, v) = (FrontEndState::default(), None, plant.dc_link());
+        let (periods, peak_a, dc_link_v, learning_s) = (0, 0.0, (v, v), 0.0);
+        Self { plant, drive, front_end, periods, peak_a, dc_link_v, trace, learning_s }
     }
 
     /// Makes the bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency first
@@ -191,11 +182,6 @@ impl Rig {
         let mut rig = Self::started(&config, seed, Mode::Torque)?;
         rig.settle(&Command::Torque(iq as f32), seconds)?;
         Ok(rig)
-    }
-
-    /// Returns the number of periods since the beginning.
-    pub fn periods(&self) -> u64 {
-        self.periods
     }
 
     /// Returns the seconds since the beginning.

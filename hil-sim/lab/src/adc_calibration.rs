@@ -27,9 +27,11 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         let residual = |&(code, current): &(f64, f64)| (code, 1e3 * (fitted.at(code) - current));
         let left: Vec<_> = points.iter().map(residual).collect();
         let ends = [0.0, LAST_CODE].map(|code| (code, fitted.at(code)));
-        readings = readings
-            .with(Series::line(format!("line {name}"), ends.to_vec()))
-            .with(Series::points(format!("readings {name}"), points.clone()).like_previous());
+        readings =
+            readings.with(Series::line(format!("line {name}"), ends.to_vec())).with(Series {
+                like_previous: true,
+                ..Series::points(format!("readings {name}"), points.clone())
+            });
         residuals = residuals.with(Series::points(format!("channel {name}"), left));
         let key = name.to_lowercase();
         outcome.metrics.set(format!("slope_{key}_a"), fitted.slope);

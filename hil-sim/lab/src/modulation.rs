@@ -68,7 +68,7 @@ fn vectors(inverter: &Inverter) -> Figure {
     let inner = inverter.vdc / 3.0_f64.sqrt();
     let corners = around(6, &on(2.0 / 3.0 * inverter.vdc));
     let hexagon = Series::reference("hexagon", corners.clone());
-    let panel = Panel::new("α (V)", "β (V)").equal_axes().with(hexagon);
+    let panel = Panel { equal_axes: true, ..Panel::new("α (V)", "β (V)").with(hexagon) };
     let names = ["U_0", "U_60", "U_120", "U_180", "U_240", "U_300"];
     let corners = names.into_iter().zip(corners);
     let corners = corners.map(|(name, corner)| Series::points(name, vec![corner]));

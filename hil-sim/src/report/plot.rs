@@ -332,7 +332,8 @@ mod tests {
     #[test]
     fn logarithmic_axes_show_decades() {
         let line = Series::line("", vec![(0.0, 1.0), (1.0, 1.0), (1000.0, 2.0)]);
-        let svg = svg_of([Panel::new("frequency (Hz)", "gain").log_x().with(line)]);
+        let svg =
+            svg_of([Panel { log_x: true, ..Panel::new("frequency (Hz)", "gain").with(line) }]);
         let texts = texts(&svg);
         for decade in ["1", "10", "100", "1000"] {
             assert!(texts.contains(&decade), "{texts:?}");

@@ -94,27 +94,9 @@ impl Panel {
         self
     }
 
-    /// Makes the horizontal axis logarithmic.
-    pub fn log_x(mut self) -> Self {
-        self.log_x = true;
-        self
-    }
-
     /// Sets the range of the vertical axis.
     pub fn y_range(mut self, low: f64, high: f64) -> Self {
         self.y_range = Some((low, high));
-        self
-    }
-
-    /// Labels the values 0 as off and 1 as on, and no others.
-    pub fn switch(mut self) -> Self {
-        self.switch = true;
-        self.y_range(-0.1, 1.1)
-    }
-
-    /// Gives a unit the same length on both axes.
-    pub fn equal_axes(mut self) -> Self {
-        self.equal_axes = true;
         self
     }
 }
@@ -150,12 +132,6 @@ impl Series {
     fn new(name: impl Into<String>, points: Vec<(f64, f64)>, style: Style) -> Self {
         let name = name.into();
         Self { name, points, style, like_previous: false }
-    }
-
-    /// Takes the colour of the previous series.
-    pub fn like_previous(mut self) -> Self {
-        self.like_previous = true;
-        self
     }
 
     /// Makes a line.

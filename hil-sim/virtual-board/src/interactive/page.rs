@@ -56,7 +56,8 @@ fn figure(record: &Record) -> Figure {
             _ => panels.push(panel(axis, series)),
         }
     }
-    panels.push(panel("outputs on", Series::line("", record.outputs())).switch());
+    let outputs = panel("outputs on", Series::line("", record.outputs())).y_range(-0.1, 1.1);
+    panels.push(Panel { switch: true, ..outputs });
     let figure = Figure::new("session", "A session with the drive", "");
     panels.into_iter().fold(figure, Figure::panel)
 }
