@@ -16,12 +16,12 @@ mod strip;
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
-use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use rayon::prelude::*;
 
 use crate::board::Board;
 use crate::power_stage::{PowerStage, REFERENCE};
@@ -101,15 +101,12 @@ pub fn run(
         SPEEDS_RPM.end()
     );
     let chosen = |change| (seed..).filter(is_chosen).take(count as usize).map(move |s| (change, s));
-    let seeds = Mutex::new((0..without.len()).flat_map(chosen));
-    let runs: Mutex<Vec<Runs>> = Mutex::new(without.iter().map(|_| Runs::default()).collect());
-    let work = || -> Result<()> {
+    let jobs: Vec<_> = (0..without.len()).flat_map(chosen).collect();
+    let work = |jobs: &[(usize, u64)]| -> Result<Vec<_>> {
         let mut scene = Scene::new(open()?, stage, set, rpm)?;
         scene.board.forgive();
-        loop {
-            // The seed determines everything, so a campaign of one fault with the seed of a failure repeats it.
-            let taken = seeds.lock().map_err(|_| anyhow!("another worker has failed"))?.next();
-            let Some((change, seed)) = taken else { return Ok(()) };
+        // The seed determines everything, so a campaign of one fault with the seed of a failure repeats it.
+        let run = |&(change, seed): &(usize, u64)| {
             let which = (seed % classes) as usize;
             let outcome = one(&mut scene, &all[which], seed / classes, seed, without[change]);
             let outcome = outcome.and_then(|outcome| {
@@ -121,20 +118,17 @@ pub fn run(
             if let Err(why) = &outcome {
                 eprintln!("{}, seed {}: {why:#}", all[which].name, seed);
             }
-            let mut runs = runs.lock().map_err(|_| anyhow!("another worker has failed"))?;
-            runs[change].entry(which).or_default().push((seed, outcome));
-        }
+            (change, which, (seed, outcome))
+        };
+        Ok(jobs.iter().map(run).collect())
     };
     // Each worker starts its own board, which takes as long as 25 faults.
-    let most = (count as usize * without.len() / 100).max(1);
-    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(most);
-    std::thread::scope(|scope| {
-        let started: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        started
-            .into_iter()
-            .try_for_each(|one| one.join().map_err(|_| anyhow!("a worker panicked"))?)
-    })?;
-    let runs = runs.into_inner().map_err(|_| anyhow!("a worker panicked"))?;
+    let workers = rayon::current_num_threads().min(jobs.len() / 100).max(1);
+    let done = jobs.par_chunks(jobs.len().div_ceil(workers).max(1)).map(work);
+    let mut runs: Vec<_> = without.iter().map(|_| Runs::default()).collect();
+    for (change, which, ended) in done.collect::<Result<Vec<_>>>()?.into_iter().flatten() {
+        runs[change].entry(which).or_default().push(ended);
+    }
     let judged = runs.iter().map(|runs| {
         let (table, failed) = table(&all, runs);
         ensure!(failed == 0, "{failed} of {count} failed\n{table}");
