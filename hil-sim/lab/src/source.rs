@@ -41,29 +41,29 @@ pub enum Kind {
 #[derive(Debug, Default)]
 pub struct Printed {
     /// `S0` or `S1`.
-    pub source: String,
+    pub source: &'static str,
     /// Number and name of the chapter or section.
-    pub chapter: String,
+    pub chapter: &'static str,
     /// Short name of the chapter.
-    id: String,
+    id: &'static str,
     /// Conditions of our values in this chapter; may be empty.
-    ours: String,
+    ours: &'static str,
     /// Name in the program, if an experiment uses it; otherwise empty.
-    name: String,
+    name: &'static str,
     /// The printed place: `Eq. 3.20`, `Table 6, 1.5 A`.
     pub place: String,
     /// Symbol or name.
-    pub quantity: String,
+    pub quantity: &'static str,
     /// Unit as printed; may be empty.
-    pub unit: String,
+    pub unit: &'static str,
     /// The value with its digits.
-    pub value: String,
+    pub value: &'static str,
     /// Its role in the source.
     pub kind: Kind,
     /// Formula by which it follows from other printed values.
     pub formula: Option<String>,
     /// Error in print beside the number, for example in its unit.
-    slip: Option<String>,
+    slip: Option<&'static str>,
     /// Whether an experiment or a formula has read the value from here.
     taken: AtomicBool,
 }
@@ -106,52 +106,38 @@ struct Cells {
     rows: Vec<Vec<String>>,
 }
 
-fn files() -> impl Iterator<Item = File> {
-    FILES.into_iter().map(|text| toml::from_str(text).expect("the lists are part of the program"))
-}
+static SOURCES: LazyLock<[File; 2]> = LazyLock::new(|| {
+    FILES.map(|text| toml::from_str(text).expect("the lists are part of the program"))
+});
 
 /// All printed values, in the order of the sources.
 pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
     let mut all = Vec::new();
-    for File { source, chapter, .. } in files() {
-        for Chapter { id, name, ours, printed, table } in chapter {
-            let chapter = name;
-            let mut add = |texts: [&str; 4], rest: Printed| {
-                let [place, quantity, unit, value] = texts.map(str::to_owned);
-                let [source, chapter, id, ours] =
-                    [&source, &chapter, &id, &ours].map(String::clone);
-                all.push(Printed {
-                    source,
-                    chapter,
-                    id,
-                    ours,
-                    place,
-                    quantity,
-                    unit,
-                    value,
-                    ..rest
-                });
-            };
-            for row in &printed {
+    for File { source, chapter, .. } in &*SOURCES {
+        for Chapter { id, name: chapter, ours, printed, table } in chapter {
+            let here = || Printed { source, chapter, id, ours, ..Printed::default() };
+            for row in printed {
                 let [place, quantity, unit, value, kind, more @ ..] = &row[..] else {
                     panic!("{chapter}: too few cells in {}", row.join(", "));
                 };
+                let place = place.clone();
                 let (kind, name) = kind.split_once(' ').unwrap_or((kind, ""));
                 let kind = toml::Value::from(kind).try_into();
                 let kind = kind.expect("input, result, graph, claim or bench");
-                let [formula, slip] = [0, 1].map(|k| more.get(k).cloned());
-                let name = name.to_owned();
-                let rest = Printed { kind, name, formula, slip, ..Printed::default() };
-                add([place, quantity, unit, value], rest);
+                let [formula, slip] = [0, 1].map(|k| more.get(k));
+                let (formula, slip) = (formula.cloned(), slip.map(String::as_str));
+                let row =
+                    Printed { place, quantity, unit, value, kind, name, formula, slip, ..here() };
+                all.push(row);
             }
-            for Cells { place, kind, columns, rows } in &table {
+            for &Cells { ref place, kind, ref columns, ref rows } in table {
                 for row in rows {
-                    let place = format!("{place}, {}", row[0]);
+                    let head = format!("{place}, {}", row[0]);
                     for (column, value) in columns.iter().zip(&row[1..]) {
-                        let formula =
-                            column.get(2).map(|text| text.replace("{| ", &format!("{{{place} | ")));
-                        let rest = Printed { kind: *kind, formula, ..Printed::default() };
-                        add([&place, &column[0], &column[1], value], rest);
+                        let (place, quantity, unit) = (head.clone(), &column[0], &column[1]);
+                        let of_row = |text: &String| text.replace("{| ", &format!("{{{head} | "));
+                        let formula = column.get(2).map(of_row);
+                        all.push(Printed { place, quantity, unit, value, kind, formula, ..here() });
                     }
                 }
             }
@@ -161,29 +147,28 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
 });
 
 /// The chapter of each figure, by source and number.
-pub(crate) static FIGURES: LazyLock<HashMap<String, String>> = LazyLock::new(|| {
-    let of = |File { source, figures, .. }: File| {
-        let chapters = figures.into_iter();
-        chapters.map(move |(number, id)| (format!("{source} {number}"), id))
+pub(crate) static FIGURES: LazyLock<HashMap<String, &str>> = LazyLock::new(|| {
+    let of = |File { source, figures, .. }: &'static File| {
+        figures.iter().map(move |(number, id)| (format!("{source} {number}"), &**id))
     };
-    files().flat_map(of).collect()
+    SOURCES.iter().flat_map(of).collect()
 });
 
 /// The quantities of the formulas, by source.
-static NAMES: LazyLock<HashMap<String, HashMap<String, f64>>> = LazyLock::new(|| {
-    let of = |File { source, names, .. }: File| {
+static NAMES: LazyLock<HashMap<&str, HashMap<&str, f64>>> = LazyLock::new(|| {
+    let of = |File { source, names, .. }: &'static File| {
         let mut values = HashMap::new();
         for [name, formula] in names {
-            let value = evaluate(&source, &formula, &values);
-            values.insert(name, value.expect("the formulas are part of the program"));
+            let value = evaluate(source, formula, &values);
+            values.insert(&**name, value.expect("the formulas are part of the program"));
         }
-        (source, values)
+        (&**source, values)
     };
-    files().map(of).collect()
+    SOURCES.iter().map(of).collect()
 });
 
 /// Evaluates a formula of a source, which contains printed values, `{PLACE | QUANTITY}`, and names.
-fn evaluate(source: &str, formula: &str, names: &HashMap<String, f64>) -> Option<f64> {
+fn evaluate(source: &str, formula: &str, names: &HashMap<&str, f64>) -> Option<f64> {
     formula::evaluate(formula, &|name| match name.split_once(" | ") {
         Some((place, quantity)) => PRINTED[place_of(source, place, quantity)?].take(),
         None => names.get(name).copied(),
@@ -227,7 +212,7 @@ pub fn beside(place: &str, quantity: &str) -> Compared {
 pub fn named(name: &str) -> Compared {
     let found = PRINTED.iter().find(|printed| printed.name == name);
     let found = found.unwrap_or_else(|| panic!("no printed value is called {name}"));
-    Compared::with(&found.source, &*found.place, &*found.quantity)
+    Compared::with(found.source, &*found.place, found.quantity)
 }
 
 /// Makes entries for the constants that the program uses for printed values: place, quantity, constant.
@@ -246,7 +231,7 @@ pub fn column(source: &str, table: &str, quantity: &str) -> Vec<f64> {
 impl Printed {
     /// Returns the value as a number: 1 and 0 for `yes` and `no`; fractions are divided.
     pub fn number(&self) -> Option<f64> {
-        match &*self.value {
+        match self.value {
             "yes" => Some(1.0),
             "no" => Some(0.0),
             value => value.parse().ok().or_else(|| formula::evaluate(value, &|_| None)),
@@ -265,7 +250,7 @@ impl Printed {
 
     /// Computes our value by its formula.
     fn recomputed(&self) -> Option<f64> {
-        value_of(&self.source, self.formula.as_deref()?)
+        value_of(self.source, self.formula.as_deref()?)
     }
 
     /// Whether our value equals the printed value within this share of a unit of its last digit.
@@ -283,7 +268,7 @@ impl Printed {
 
     /// Returns one unit of the last printed digit. For a whole number it is 1, regardless of trailing zeros.
     fn last_digit(&self) -> f64 {
-        let (digits, exponent) = self.value.split_once('e').unwrap_or((&self.value, "0"));
+        let (digits, exponent) = self.value.split_once('e').unwrap_or((self.value, "0"));
         let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
         10f64.powi(exponent.parse::<i32>().unwrap_or(0) - decimals as i32)
     }
@@ -363,7 +348,7 @@ fn judge(place: usize, ours: &Compared, value: f64) -> Verdict {
     let equal_but = |what: &str| (Class::EqualBut, format!("equal but for: {what}"));
     // Our value is rounded as well.
     if printed.agrees(value, 0.501) {
-        return printed.slip.as_deref().map_or(Class::Equal.named(), equal_but);
+        return printed.slip.map_or(Class::Equal.named(), equal_but);
     }
     if let Some((what, _)) = ours.but.filter(|(_, share)| off < *share) {
         return equal_but(what);

@@ -23,7 +23,7 @@ impl Default for Evidence {
     fn default() -> Self {
         let of = |(place, printed): (usize, &'static Printed)| {
             let value = printed.recomputed()?;
-            let ours = Compared::with(&printed.source, &*printed.place, &*printed.quantity);
+            let ours = Compared::with(printed.source, &*printed.place, printed.quantity);
             Some((place, (Vec::new(), ours.of_print(value))))
         };
         let compared = PRINTED.iter().enumerate().filter_map(of).collect();
@@ -292,14 +292,14 @@ impl Evidence {
         let differences = both.map(|value| 100.0 * (value / number - 1.0));
         let difference = differences.max_by(|a, b| a.abs().total_cmp(&b.abs()));
         let difference = difference.filter(|d| is_number && d.is_finite());
-        let text = || printed.value.clone();
+        let text = || printed.value.to_owned();
         let value = printed.number().filter(|_| is_number);
         let value =
             value.map_or_else(|| text().into(), |value| Cell::Number { value, text: text() });
         [
             ("place", Cell::from(printed.place.as_str())),
-            ("quantity", printed.quantity.as_str().into()),
-            ("unit", printed.unit.as_str().into()),
+            ("quantity", printed.quantity.into()),
+            ("unit", printed.unit.into()),
             ("printed", value),
             ("recomputed", shown(ours.and_then(|ours| ours.recomputed))),
             ("by", Cell::or_dash(printed.formula.as_deref().map(|text| notation(text).into()))),
@@ -342,8 +342,8 @@ impl Chapter {
         let mut outcome = Outcome::default();
         outcome.tables.push(Table::new(printed.head(), &[]));
         let name = format!("{}-{}", printed.source, printed.id);
-        let about = printed.chapter.clone();
-        Self { name, source: &printed.source, about, runs: Vec::new(), outcome }
+        let about = printed.chapter.to_owned();
+        Self { name, source: printed.source, about, runs: Vec::new(), outcome }
     }
 
     fn is_of(&self, printed: &Printed) -> bool {

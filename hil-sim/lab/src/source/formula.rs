@@ -7,6 +7,13 @@
 /// The operators. Each one has precedence over those before it, so `a*b/c` is `a*(b/c)`.
 const OPERATORS: &str = "<>+-*/^";
 
+/// The functions, by name.
+#[rustfmt::skip]
+const FUNCTIONS: [(&str, fn(f64) -> f64); 8] = [
+    ("abs", f64::abs), ("atan", f64::atan), ("cos", f64::cos), ("exp", f64::exp),
+    ("ln", f64::ln), ("sin", f64::sin), ("sqrt", f64::sqrt), ("tan", f64::tan),
+];
+
 /// Returns the value of a formula; `value` gives the values of its names.
 pub fn evaluate(formula: &str, value: &dyn Fn(&str) -> Option<f64>) -> Option<f64> {
     let mut formula = Formula { rest: formula.trim_start(), value };
@@ -71,17 +78,7 @@ impl<'a> Formula<'a> {
                     "TAU" => Some(std::f64::consts::TAU),
                     function if self.rest.starts_with('(') => {
                         let x = self.operand()?;
-                        Some(match function {
-                            "abs" => x.abs(),
-                            "atan" => x.atan(),
-                            "cos" => x.cos(),
-                            "exp" => x.exp(),
-                            "ln" => x.ln(),
-                            "sin" => x.sin(),
-                            "sqrt" => x.sqrt(),
-                            "tan" => x.tan(),
-                            _ => return None,
-                        })
+                        FUNCTIONS.iter().find(|(name, _)| *name == function).map(|(_, of)| of(x))
                     }
                     text => text.parse().ok().or_else(|| (self.value)(text)),
                 }
