@@ -64,15 +64,13 @@ type Job = (AngleSource, (f64, f64), (f64, f64), f64, bool);
 fn jobs() -> Vec<Job> {
     let mut jobs = Vec::new();
     for point in POINTS {
-        for share in RESIDUALS {
-            jobs.push((AngleSource::Encoder, point, (0.0, 0.0), share, true));
-        }
+        jobs.extend(RESIDUALS.map(|share| (AngleSource::Encoder, point, (0.0, 0.0), share, true)));
         jobs.push((AngleSource::Encoder, point, (0.0, 0.0), 0.5, false));
     }
     for point in SENSORLESS {
-        for share in RESIDUALS {
-            jobs.push((AngleSource::Injection, point, EXCITATION, share, true));
-        }
+        jobs.extend(
+            RESIDUALS.map(|share| (AngleSource::Injection, point, EXCITATION, share, true)),
+        );
         jobs.push((AngleSource::Injection, point, (0.0, 0.0), 0.2, true));
     }
     jobs

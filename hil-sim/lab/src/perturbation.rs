@@ -151,9 +151,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     })?;
 
     let mut outcome = Outcome::default();
-    for m in results.iter().filter(|m| m.lost > 0) {
-        outcome.faults.push(format!("{}: {} of {SEEDS} runs lost", m.case.name, m.lost));
-    }
+    let lost = |m: &StepResponse| format!("{}: {} of {SEEDS} runs lost", m.case.name, m.lost);
+    outcome.faults = results.iter().filter(|m| m.lost > 0).map(lost).collect();
     let seeds = [("seeds", SEEDS as f64)];
     let mut table = texts::table_with("perturbation", "steps", &seeds);
     let is_load = |m: &&StepResponse| m.case.is_load();

@@ -138,11 +138,8 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
 fn compared(outcome: &mut Outcome) {
     let plain = Response::of(without(), LIMIT);
     let of = |quantity, used| beside("Figure 40", quantity).used(used);
-    outcome.compared.extend([
-        of("K_c", K_C),
-        of("z_c", Z_C),
-        of("limit of the control effort", LIMIT),
-    ]);
+    let limit = of("limit of the control effort", LIMIT);
+    outcome.compared.extend([of("K_c", K_C), of("z_c", Z_C), limit]);
     let late = Response::of(literal(LIMIT), LIMIT).y.split_off(SAMPLES - 40);
     let swing = highest(&late) - late.iter().copied().fold(f64::INFINITY, f64::min);
     outcome.metrics.set("printed_anti_windup_swing", swing);

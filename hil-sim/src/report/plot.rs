@@ -101,13 +101,11 @@ fn draw(figure: &Figure, width: i32) -> Result<Vec<Part>, Failure> {
     let mut parts = Vec::new();
     for (k, panel) in panels.iter().enumerate() {
         let (x, y) = ranges(panel, if shared { &panels[..] } else { &panels[k..=k] }, width);
+        // A legend is not repeated below an equal one.
+        let repeats = shared && k > 0 && legend(panel) == legend(panels[k - 1]);
         let frame = Frame {
             width,
-            // A legend is not repeated below an equal one.
-            legend: match legend(panel) {
-                same if shared && k > 0 && same == legend(panels[k - 1]) => Vec::new(),
-                entries => entries,
-            },
+            legend: if repeats { Vec::new() } else { legend(panel) },
             labels: if k == 0 { labels(events, &x, width) } else { Vec::new() },
             events: events.iter().map(|event| event.0).filter(|at| x.contains(at)).collect(),
             has_x_labels: !shared || k + 1 == panels.len(),

@@ -47,7 +47,8 @@ impl Key {
 
     /// Returns the keys of the plant with their values after the saliency self-commissioning.
     pub fn after() -> impl Iterator<Item = Self> {
-        BENCH.iter().filter(|key| is_of_plant(key)).map(Self::After)
+        let is_of_plant = |key: &&BenchKey| PLANT.iter().any(|group| key.name.starts_with(group));
+        BENCH.iter().filter(is_of_plant).map(Self::After)
     }
 
     /// Returns the keys that an assignment to `name` sets, one or two.
@@ -194,14 +195,10 @@ fn double(number: f32) -> f64 {
     number.to_string().parse().unwrap_or(number.into())
 }
 
-/// Groups of the keys of the plant that may change; the model and its flux level stay.
+/// Groups of the keys of the plant that may change after the saliency self-commissioning; the model and its flux level
+/// stay.
 const PLANT: [&str; 8] =
     ["motor.", "saliency.", "iron.", "warming.", "inverter.", "dc_link.", "measurement.", "shaft."];
-
-/// Whether a key belongs to the plant and may change after the saliency self-commissioning.
-fn is_of_plant(key: &BenchKey) -> bool {
-    PLANT.iter().any(|group| key.name.starts_with(group))
-}
 
 /// Refuses keys that have no effect with the chosen machine model.
 ///

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use include_dir::{Dir, include_dir};
+use include_dir::{Dir, File, include_dir};
 use serde::{Deserialize, Serialize};
 
 use super::passport::Passport;
@@ -78,7 +78,10 @@ pub struct Motor {
 impl Motor {
     /// Returns all motors that come with the program, by name.
     pub fn all() -> Vec<Self> {
-        let mut all: Vec<Self> = FILES.files().filter_map(|file| embedded(file.path())).collect();
+        // A test parses every file.
+        let parsed =
+            |file: &File<'_>| parse(file.path().file_stem()?.to_str()?, file.contents_utf8()?).ok();
+        let mut all: Vec<Self> = FILES.files().filter_map(parsed).collect();
         all.sort_by(|a, b| a.name.cmp(&b.name));
         all
     }
@@ -194,14 +197,11 @@ impl Motor {
         let inertia = four_digits(base.motor.inertia * config.rated_nm() / base.rated_nm());
         let flux = if self.says("sequence.i_d") { "sequence.i_d" } else { "sequence.flux" };
         let commissioned = "by rule: as a commissioned drive has it";
+        let sensors = "by rule: rated current, injection and ripple, and 12 %";
         let all = [
             ("current_plant", "motor".to_owned(), commissioned),
             (flux, "high".to_owned(), commissioned),
-            (
-                "measurement.range_a",
-                range_a,
-                "by rule: rated current, injection and ripple, and 12 %",
-            ),
+            ("measurement.range_a", range_a, sensors),
             ("motor.inertia", inertia, "assumed: in proportion to the rated torque"),
             ("prepare.learn", "yes".to_owned(), "by rule: the drive has not learned this motor"),
         ];
@@ -273,12 +273,6 @@ fn is_file(name: &str) -> bool {
 fn of_passport(name: &str, Passport { image, twin, .. }: Passport) -> Motor {
     let (name, about, source) = (name.to_owned(), String::new(), Vec::new());
     Motor { name, title: format!("passport, {image}"), about, source, settings: twin }
-}
-
-fn embedded(path: &Path) -> Option<Motor> {
-    let name = path.file_stem()?.to_str()?;
-    // A test parses every file.
-    parse(name, FILES.get_file(path)?.contents_utf8()?).ok()
 }
 
 fn parse(name: &str, text: &str) -> Result<Motor, toml::de::Error> {

@@ -22,11 +22,9 @@ pub struct Errors {
 
 /// Mean of the errors, %, over the measurements that give an error.
 fn mean(errors: impl Iterator<Item = Option<f64>>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0u32);
-    for error in errors.flatten() {
-        (sum, count) = (sum + error.abs(), count + 1);
-    }
-    if count > 0 { 100.0 * sum / f64::from(count) } else { 100.0 }
+    let errors: Vec<_> = errors.flatten().map(f64::abs).collect();
+    let sum: f64 = errors.iter().sum();
+    if errors.is_empty() { 100.0 } else { 100.0 * sum / errors.len() as f64 }
 }
 
 /// Errors of one column over `trials` measurements of `machine`. If no measurement gives a number, its error counts as

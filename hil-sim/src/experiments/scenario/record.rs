@@ -2,7 +2,7 @@
 
 use drive_core::carrier::CARRIER_SAMPLES;
 
-use super::file::{Metric, Over, Statistic};
+use super::file::{Metric, Over, PanelText, Statistic};
 use super::quantity::{Named, QUANTITIES, Quantity, Seen};
 use super::{Part, Reference, Scenario, Shaft};
 use crate::outcome::Step;
@@ -72,11 +72,9 @@ impl Scenario {
             let part = record.parts[record.begun.len() - 1];
             let value = part.at(part.reference, t);
             let regulates = rig.drive.state().regulates();
-            if regulates {
-                let taken = rig.command(&(reference.command)(value as f32))?;
-                if let Accepted::Limited(to) = taken {
-                    record.limited.get_or_insert((t, value, to));
-                }
+            let wanted = (reference.command)(value as f32);
+            if regulates && let Accepted::Limited(to) = rig.command(&wanted)? {
+                record.limited.get_or_insert((t, value, to));
             }
             if let Some(load) = self.load(&part, t) {
                 rig.set_load(load)?;
@@ -213,9 +211,8 @@ impl Record {
         let samples = if text.samples == 0 { CARRIER_SAMPLES } else { text.samples };
         let synchronous = self.config.drive.injection.demodulator == DemodulatorKind::Synchronous;
         let axes = |label: &str| Panel::new("time (s)", label);
-        for panel in
-            text.panel.iter().filter(|panel| panel.synchronous.is_none_or(|is| is == synchronous))
-        {
+        let is_shown = |panel: &&PanelText| panel.synchronous.is_none_or(|is| is == synchronous);
+        for panel in text.panel.iter().filter(is_shown) {
             let label = panel.lines.first().map_or("", |line| line.of.0.label);
             let axes = axes(panel.label.as_deref().unwrap_or(label));
             figure = figure.panel(panel.lines.iter().fold(axes, |axes, line| {
