@@ -25,10 +25,15 @@ pub fn test(elf: &Path) -> Result<()> {
     run::step("the images on the virtual board", &mut command)
 }
 
-/// Format, lints and documentation of the virtual board, in the profile of its tests, so that the emulator is built once.
+/// Format, lints and documentation of the virtual board and of its chip, and the tests of the chip, which need no image. All use the profile
+/// of the tests, so that the emulator is built once.
 pub fn check() -> Result<()> {
-    let words =
-        ["fmt --check", "clippy --release --all-targets -- -D warnings", "doc --release --no-deps"];
+    let words = [
+        "fmt --all --check",
+        "clippy --release --workspace --all-targets -- -D warnings",
+        "doc --release --workspace --no-deps",
+        "test --release --package stm32g4-unicorn",
+    ];
     words.into_iter().try_for_each(|words| {
         run::step("virtual board", cargo(words).env("RUSTDOCFLAGS", "-D warnings"))
     })

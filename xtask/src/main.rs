@@ -240,7 +240,7 @@ fn test() -> Result<()> {
     documents.args(["--ignored", "--nocapture"]).args(tables);
     steps.command("commands and tables of the documents", documents);
 
-    let check = "format, lints, documentation of the virtual board";
+    let check = "format, lints, documentation of the virtual board, tests of its chip";
     steps.with(compiler, check, |()| board::check());
     let built = steps.joined(images);
     let elf = target.zip(built).map(|(target, ())| target.image()).transpose()?;

@@ -3,7 +3,8 @@
 
 use anyhow::{Context, Result, ensure};
 
-use crate::{image::Image, memory::Region};
+use crate::image::Image;
+use stm32g4_unicorn::memory::Region;
 
 /// Name of the table.
 const SYMBOL: &str = "INDUCTION_DRIVE_ADDRESSES";

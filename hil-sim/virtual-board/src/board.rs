@@ -17,6 +17,7 @@ use std::collections::VecDeque;
 use anyhow::{Result, anyhow, bail, ensure};
 use drive_core::{Sample, Telemetry};
 use hil_sim::plant::Plant;
+use induction_drive::board::{HSE_HZ, PWM_TOP};
 
 pub use control::{LongestPath, Period};
 pub use debugger::Debugger;
@@ -24,12 +25,24 @@ use motor::Connection;
 pub use motor::Disturbance;
 pub use options::Options;
 
-use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::{
-    addresses::Addresses, cpu::Cpu, image::Image, log::Log, memory, periph::Reset,
-    periph::iwdg::LSI_HZ, power_stage::watch::GateWatch, rules::Violation,
-};
+use crate::{addresses::Addresses, image::Image, log::Log, power_stage::watch::GateWatch};
 use control::RunningInterrupt;
+use stm32g4_unicorn::chip::{ADC_INTERRUPT, TICKS_PER_S, pins::Pin};
+use stm32g4_unicorn::{memory, periph::Reset, periph::iwdg::LSI_HZ, rules::Violation};
+
+/// The chip with the power stage at its pins.
+pub type Chip = stm32g4_unicorn::Chip<GateWatch>;
+/// The core of that chip.
+pub type Cpu = stm32g4_unicorn::Cpu<GateWatch>;
+
+/// Exception number of the control interrupt.
+pub const CONTROL_INTERRUPT: u16 = ADC_INTERRUPT;
+/// Ticks of a PWM period, from one top of the counter to the next.
+pub const TICKS_PER_PERIOD: u64 = 2 * PWM_TOP as u64;
+/// The pins of the brake chopper, of the precharge relay, and of the driver of the field bus.
+const CHOPPER: Pin = (2, 6);
+const RELAY: Pin = (2, 8);
+const BUS_DRIVER: Pin = (2, 12);
 
 /// Number of periods after which the log is fetched, before its buffer in RAM is full.
 const PERIODS_PER_LOG: u32 = 100;
@@ -128,10 +141,12 @@ impl Board {
         if options.confirmed {
             confirmed::save(&options, &mut chip.flash)?;
         }
-        chip.gates = GateWatch::new(options.power_stage, &chip.gpio, &chip.tim1);
-        chip.look_at_gates();
-        chip.dc_link.source = options.dc_link_pin;
-        chip.fault_pull_ohm = options.fault_pull_ohm;
+        chip.rcc.crystal_hz = HSE_HZ;
+        chip.bus_driver = Some(BUS_DRIVER);
+        chip.circuit = GateWatch::new(options.power_stage, &chip.gpio, &chip.tim1);
+        chip.follow_pins();
+        chip.pa1.source = options.dc_link_pin;
+        chip.break_pull_ohm = options.fault_pull_ohm;
         board.show_sample();
         // The dc link is charged before the first period. (A copy is used, so that the noise of the periods is the same.)
         let dc_link = board.plant.clone().sample().dc_link;
@@ -173,6 +188,16 @@ impl Board {
     /// Returns the chip.
     pub fn chip(&mut self) -> &mut Chip {
         self.cpu.chip_mut()
+    }
+
+    /// Returns the duty of the brake chopper.
+    pub fn chopper_duty(&self) -> f64 {
+        self.cpu.chip().tim8_duty(CHOPPER)
+    }
+
+    /// Whether the precharge relay is closed.
+    pub fn is_precharged(&self) -> bool {
+        self.cpu.chip().drives_high(RELAY)
     }
 
     /// Returns the last sample.
@@ -272,7 +297,7 @@ impl Board {
         if let Some(violation) = chip.rules.fatal() {
             bail!("{violation}\n{}", self.image.location(violation.at));
         }
-        if let Some(seen) = chip.gates.take() {
+        if let Some(seen) = chip.circuit.take() {
             let (place, time) =
                 (self.image.location(seen.at), seen.time as f64 / TICKS_PER_S as f64);
             bail!("bad gate signals: {} after {time:.6} s, at {place}", seen.what);

@@ -23,12 +23,13 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 
-use crate::board::Board;
+use crate::board::{Board, TICKS_PER_PERIOD};
+use crate::image::Image;
 use crate::power_stage::{PowerStage, REFERENCE};
-use crate::{chip::TICKS_PER_PERIOD, image::Image, periph::Reset};
 use class::{Class, Run};
 use judge::Outcome;
 use scene::Scene;
+use stm32g4_unicorn::periph::Reset;
 
 /// One run in this number continues after its reset until the console greets.
 const WHOLE_STARTS: u64 = 10;

@@ -10,12 +10,13 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result, bail, ensure};
 use drive_core::State;
 use hil_sim::{Config, config::LoadMode};
-use induction_drive::board::LONGEST_INTERRUPT_CYCLES;
+use induction_drive::board::{LONGEST_INTERRUPT_CYCLES, WAIT_STATES};
 
-use crate::board::{Board, LongestPath, Options, Period};
-use crate::chip::{TICKS_PER_PERIOD, Watched};
-use crate::cost::{self, BUS, TAKEN, instructions};
-use crate::{image::Image, memory, pair::Pair};
+use crate::board::{Board, LongestPath, Options, Period, TICKS_PER_PERIOD};
+use crate::{image::Image, pair::Pair};
+use stm32g4_unicorn::chip::Watched;
+use stm32g4_unicorn::cost::{self, BUS, TAKEN, instructions};
+use stm32g4_unicorn::memory;
 
 /// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match applies.
 const BLOCKS: [(&str, &str); 12] = [
@@ -223,7 +224,8 @@ fn row(
         }
         // The identification is counted as if the flash had no wait states, because interrupts come in between.
         if entry > 0 && block.address < memory::CCM {
-            *row.blocks.entry(OVERHEAD[2]).or_default() += cost::waits(block.address, block.size);
+            let waits = cost::waits(block.address, block.size, WAIT_STATES.into());
+            *row.blocks.entry(OVERHEAD[2]).or_default() += waits;
         }
         for instruction in list {
             let at = block.address + instruction.offset;

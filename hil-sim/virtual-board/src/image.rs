@@ -10,7 +10,8 @@ use object::elf::PT_LOAD;
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Architecture, Object, ObjectSection, ObjectSymbol, SymbolKind};
 
-use crate::{memory::Region, power_stage::REFERENCE};
+use crate::power_stage::REFERENCE;
+use stm32g4_unicorn::memory::Region;
 
 type Slice = EndianArcSlice<RunTimeEndian>;
 

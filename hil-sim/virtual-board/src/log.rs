@@ -3,8 +3,8 @@
 use anyhow::{Context, Result, anyhow};
 use defmt_decoder::{DecodeError, Table};
 
-use crate::memory::{self, Region};
-use crate::{cpu::Cpu, image::Image};
+use crate::{board::Cpu, image::Image};
+use stm32g4_unicorn::memory::{self, Region};
 
 /// Offset of up-buffer 0 in the control block: after its ID and two counts.
 const BUFFER: u32 = 0x18;

@@ -18,6 +18,8 @@ use induction_drive::boards::{self as boards_of_the_firmware, Board};
 pub use boards::{ALL, REFERENCE};
 use driver::Driver;
 use shunts::Shunts;
+pub use stm32g4_unicorn::chip::CODES;
+use stm32g4_unicorn::circuit::{SUPPLY_V, Source};
 
 /// The six inputs of the drivers at the chip: port (0 is A) and number of the pins of the high and the low side of the
 /// legs a, b and c. This is ST's morpho connector for motor control, which is the same on all boards here: PA8, PA7;
@@ -37,10 +39,8 @@ pub mod channel {
     pub const HEAT_SINK: usize = 8;
 }
 
-/// Reference voltage of the ADCs, V: the 3.3 V supply of the Nucleo board.
-pub const REFERENCE_V: f64 = 3.3;
-/// Number of ADC counts.
-pub const CODES: f64 = 4096.0;
+/// Reference voltage of the ADCs, V: the supply of the Nucleo board.
+pub const REFERENCE_V: f64 = SUPPLY_V;
 
 /// Limits of the gate signals, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,20 +69,6 @@ impl Switches {
     }
 }
 
-/// The circuit at the pin of the dc link.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum DcLinkPin {
-    /// A divider with this resistance, seen from the pin, and a capacitor to ground.
-    Divider {
-        /// Resistance, ohm.
-        ohm: f64,
-        /// Capacitance, F.
-        farad: f64,
-    },
-    /// An amplifier or an isolated sensor drives the pin: a pull resistor of the chip does not change its level.
-    Driven,
-}
-
 /// A power stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerStage {
@@ -95,7 +81,7 @@ pub struct PowerStage {
     /// Voltage limits of the switches.
     pub switches: Switches,
     /// The circuit at the pin of the dc link.
-    pub dc_link_pin: DcLinkPin,
+    pub dc_link_pin: Source,
     /// Resistor from the fault input to the supply of the chip, ohm.
     pub fault_pull_ohm: f64,
     /// Pins, as in [`GATE_PINS`], that the board ties to nets of other signals: they stay analog.

@@ -6,6 +6,10 @@ use std::process::Command;
 use anyhow::{Context, Result, bail, ensure};
 use virtual_board::{Image, PowerStage, dump};
 
+#[allow(dead_code, reason = "only names and offsets of the registers are compared here")]
+#[path = "../stm32g4-unicorn/tests/registers/svd.rs"]
+mod svd;
+
 /// Parses name, address, value, and bits to compare from a line of the virtual board.
 fn register(line: &str) -> Result<(&str, u32, u32, u32)> {
     let words: Vec<&str> = line.split_whitespace().collect();
@@ -67,4 +71,30 @@ fn a_difference_names_the_bits_and_the_mask_hides_others() {
     let text = difference(line, 0x0004_3f9e ^ 0x1800).unwrap().unwrap();
     assert!(text.starts_with("TIM1_BDTR: ") && text.ends_with("bits 11 12"), "{text}");
     assert!(word("").is_err() && word("error").is_err() && register("A B C X").is_err());
+}
+
+/// The registers that are compared with those of a real board have the names and addresses of the access crate.
+#[test]
+fn compared_registers_are_those_of_the_access_crate() -> Result<()> {
+    // The crate uses other names: C1CSR, APB1L_FZ, APB2_FZ; the memory protection belongs to the core.
+    let elsewhere = ["COMP1_", "DBGMCU_", "MPU_"];
+    let compared = dump::registers()?;
+    for (name, address, _) in &compared {
+        let Some((_, register)) = name.split_once('_') else { panic!("{name}") };
+        if elsewhere.iter().any(|first| name.starts_with(first)) {
+            continue;
+        }
+        let mut found = false;
+        for (module, _, base) in svd::BLOCKS {
+            let offset = address.wrapping_sub(base);
+            found |= svd::registers(module)?.iter().any(|known| {
+                // CCMR1 has two names in the crate, for inputs and for outputs.
+                let name = known.name.trim_end_matches("_output");
+                known.offset == offset && name.eq_ignore_ascii_case(register)
+            });
+        }
+        assert!(found, "{name} at {address:#x}");
+    }
+    assert!(compared.len() > 60, "{}", compared.len());
+    Ok(())
 }

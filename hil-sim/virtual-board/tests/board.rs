@@ -3,9 +3,9 @@
 use crate::common;
 use anyhow::{Context, Result};
 use drive_core::State;
-use virtual_board::cpu::Register;
-use virtual_board::memory;
-use virtual_board::periph::Reset;
+use stm32g4_unicorn::cpu::Register;
+use stm32g4_unicorn::memory;
+use stm32g4_unicorn::periph::Reset;
 
 /// Number of periods between two reports of the control to the console.
 const REPORT: u64 = 601;

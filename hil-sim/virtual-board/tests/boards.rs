@@ -7,8 +7,8 @@ use drive_core::State;
 use hil_sim::config::LoadMode;
 use hil_sim::plant::Load;
 use induction_drive::boards::{self, ANALOG, CONTACTS, Currents, Level};
+use stm32g4_unicorn::periph::Reset;
 use virtual_board::board::Debugger;
-use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, CODES, REFERENCE_V, channel};
 use virtual_board::{Board, Image, Options, Pair, PowerStage};
 

@@ -79,7 +79,7 @@ fn commissioned(seed: u64) -> Result<(f64, String)> {
     }
     // The settings are saved as well: after a power cycle the identified values are in force.
     console.say("accept", "\nok")?;
-    console.board.reset(virtual_board::periph::Reset::Power);
+    console.board.reset(stm32g4_unicorn::periph::Reset::Power);
     console.until("last run")?;
     let (found, truth) = (in_force(&mut console)?, Circuit::of_plant(&config));
     let pairs = found.values().into_iter().zip(truth.values());

@@ -5,8 +5,8 @@ use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
+use stm32g4_unicorn::periph::Reset;
 use virtual_board::board::Debugger;
-use virtual_board::periph::Reset;
 use virtual_board::{Board, Pair};
 
 /// The brake resistor, ohm.
@@ -54,7 +54,7 @@ fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
     let mut n = 0;
     while rpm(&pair) > 50.0 {
         pair.run(1, |_, _| {})?;
-        let (v, duty) = (pair.board.plant.dc_link(), pair.board.chip().chopper_duty());
+        let (v, duty) = (pair.board.plant.dc_link(), pair.board.chopper_duty());
         // The timer's pulse equals the request of the drive's core, to half a tick.
         let asked = f64::from(pair.shadow.output.chopper);
         assert!((duty - asked).abs() < 1e-3, "{duty} at the pin, {asked} requested");
@@ -79,10 +79,10 @@ type End<'a> = &'a dyn Fn(&mut Board) -> Result<()>;
 fn every_end_takes_the_chopper_off() -> Result<()> {
     let mut pair = braked(|_| {}, &["start torque"])?;
     pair.until_state(State::Torque)?;
-    assert_eq!(pair.board.chip().chopper_duty(), 0.0);
+    assert_eq!(pair.board.chopper_duty(), 0.0);
     pair.board.plant.set_dc_link(385.0)?;
     pair.run(600, |_, _| {})?;
-    let duty = pair.board.chip().chopper_duty();
+    let duty = pair.board.chopper_duty();
     assert!((0.5..0.8).contains(&duty), "{duty}: 385 V of 378.3 to 388 V");
     let running = pair.board.keep()?;
     let ends: [(&str, u64, End); 6] = [
@@ -113,13 +113,13 @@ fn every_end_takes_the_chopper_off() -> Result<()> {
     ];
     for (what, periods, end) in ends {
         pair.board.go_back(&running)?;
-        assert_eq!(pair.board.chip().chopper_duty(), duty, "{what}");
+        assert_eq!(pair.board.chopper_duty(), duty, "{what}");
         end(&mut pair.board).context(what)?;
         for _ in 0..periods {
             pair.board.run_periods(1).context(what)?;
             while pair.board.next_period().is_some() {}
         }
-        assert_eq!(pair.board.chip().chopper_duty(), 0.0, "{what}");
+        assert_eq!(pair.board.chopper_duty(), 0.0, "{what}");
         pair.board.set_fault_pin(true);
         pair.board.chip().set_supply(3.3);
     }
@@ -130,7 +130,7 @@ fn every_end_takes_the_chopper_off() -> Result<()> {
     pair.board.cpu.write(address, &word.to_le_bytes());
     pair.board.run_periods(130)?;
     assert_eq!(pair.board.resets.last().map(|r| r.1), Some(Reset::Software));
-    assert_eq!(pair.board.chip().chopper_duty(), 0.0);
+    assert_eq!(pair.board.chopper_duty(), 0.0);
     Ok(())
 }
 
@@ -148,7 +148,7 @@ fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
     // The mains are switched off, and the other loads discharge the capacitor.
     pair.board.plant.set_mains(0.0)?;
     pair.until("an empty link", 60_000, |pair, _| pair.board.plant.dc_link() < 50.0)?;
-    assert!(!pair.board.chip().relay_pin());
+    assert!(!pair.board.is_precharged());
     let answer = pair.ask("start torque")?;
     assert_eq!(
         answer.last(),
@@ -156,7 +156,7 @@ fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
     );
     pair.board.plant.set_mains(mains)?;
     let mut n = 0;
-    while !pair.board.chip().relay_pin() {
+    while !pair.board.is_precharged() {
         pair.run(1, |_, _| {})?;
         n += 1;
         assert!(n < 12_000, "open at {} V", pair.board.plant.dc_link());
@@ -166,19 +166,19 @@ fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
     // With 200 ohm the load of 5 W costs 3.3 V; 5 V of band and 0.3 s leave 5 / (e^3.2 - 1) V more.
     assert!(v > mains - 5.0 && took > 0.3, "{v} V after {took} s");
     pair.start_torque()?;
-    assert!(pair.board.chip().relay_pin());
+    assert!(pair.board.is_precharged());
     pair.order("stop")?;
     pair.until_state(State::Off)?;
-    assert!(pair.board.chip().relay_pin(), "a stop leaves the link charged");
+    assert!(pair.board.is_precharged(), "a stop leaves the link charged");
     // A handler that ends the run opens the relay.
     let running = pair.board.keep()?;
     pair.board.hang();
     pair.board.run_periods(40)?;
-    assert!(!pair.board.chip().relay_pin(), "after the watchdog");
+    assert!(!pair.board.is_precharged(), "after the watchdog");
     pair.board.go_back(&running)?;
     pair.board.plant.set_mains(0.0)?;
     pair.until("under-voltage", 60_000, |pair, _| pair.board.plant.dc_link() < 199.0)?;
     pair.run(2, |_, _| {})?;
-    assert!(!pair.board.chip().relay_pin(), "below under-voltage");
+    assert!(!pair.board.is_precharged(), "below under-voltage");
     Ok(())
 }

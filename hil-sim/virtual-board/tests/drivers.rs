@@ -3,7 +3,7 @@
 use crate::common::script::*;
 use anyhow::Result;
 use drive_core::Compare;
-use virtual_board::periph::Reset;
+use stm32g4_unicorn::periph::Reset;
 use virtual_board::power_stage::bridge::{BadGates, Leg};
 use virtual_board::power_stage::shunts::Shunts;
 use virtual_board::power_stage::{ALL, PowerStage};

@@ -25,8 +25,8 @@ use hil_sim::first_light::wire::{Port, Wire};
 use hil_sim::plant::Load;
 use induction_drive::board::{ADC_FULL_SCALE, protection};
 use induction_drive::boards::Level;
+use stm32g4_unicorn::periph::Reset;
 use virtual_board::board::{Debugger, snapshot::Snapshot};
-use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
 use virtual_board::{Board, Counting, Image, Options, dump};
 

@@ -3,9 +3,9 @@
 use anyhow::{Result, ensure};
 use drive_core::{Drive, State};
 use hil_sim::Config;
+use stm32g4_unicorn::cpu::Register;
 use virtual_board::addresses::Addresses;
 use virtual_board::board::snapshot::Snapshot;
-use virtual_board::cpu::Register;
 use virtual_board::{Board, Image, Pair};
 
 use crate::common;

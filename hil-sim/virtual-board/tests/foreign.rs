@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use hil_sim::Config;
-use virtual_board::periph::gpio::Pad;
-use virtual_board::rules::Rule;
+use stm32g4_unicorn::periph::gpio::Pad;
+use stm32g4_unicorn::rules::Rule;
 use virtual_board::{Board, Counting, Image, Options};
 
 /// Environment variable with the folder of the programs.

@@ -4,9 +4,11 @@ use anyhow::{Context, Result};
 use drive_core::{Fault, State};
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
+use induction_drive::board::{CLOCK_HZ, HSI_HZ};
+use stm32g4_unicorn::chip::TICKS_PER_S;
+use stm32g4_unicorn::periph::{Reset, rcc};
+use virtual_board::board::TICKS_PER_PERIOD;
 use virtual_board::board::rom::{N_BOOT0, N_SWBOOT0};
-use virtual_board::chip::TICKS_PER_PERIOD;
-use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
 use virtual_board::{Board, Image, Options, Pair};
 
@@ -22,7 +24,7 @@ fn board(stage: &'static PowerStage) -> Result<Board> {
 /// Returns the gates that are requested on, or may be, of a chip that stands still.
 fn gates_on(board: &mut Board) -> Vec<String> {
     let chip = board.chip();
-    let driver = chip.gates.stage.driver;
+    let driver = chip.circuit.stage.driver;
     let mut on = Vec::new();
     for (leg, name) in ["a", "b", "c"].into_iter().enumerate() {
         let requests = driver.requests(leg, &chip.gpio, &chip.tim1, true);
@@ -190,4 +192,11 @@ fn braking_stays_below_what_the_transistors_stand() -> Result<()> {
     assert!(stress_v < 0.95 * rated_v, "{stress_v} V");
     assert_eq!(state, State::Speed);
     Ok(())
+}
+
+/// The numbers of the emulated chip that the firmware states as well.
+#[test]
+fn clocks_of_the_chip_are_those_of_the_firmware() {
+    assert_eq!(TICKS_PER_S, u64::from(CLOCK_HZ));
+    assert_eq!(rcc::HSI_HZ, HSI_HZ);
 }

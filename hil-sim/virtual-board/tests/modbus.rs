@@ -204,7 +204,7 @@ fn the_answer_comes_at_once_and_in_one_piece() -> Result<()> {
         assert!(times.windows(2).all(|pair| pair[1] - pair[0] < 2.5 * byte_s));
         // PC12.
         let driver = master.board.chip().gpio[2].pad(12);
-        assert_eq!(driver, virtual_board::periph::gpio::Pad::Output(false));
+        assert_eq!(driver, stm32g4_unicorn::periph::gpio::Pad::Output(false));
     }
     Ok(())
 }
@@ -222,7 +222,7 @@ fn rate_format_and_address_follow_the_settings() -> Result<()> {
     let chip = master.board.chip();
     let request: Vec<_> = framed(&[1, 3, 0x20, 0, 0, 1]).into_iter().map(u16::from).collect();
     chip.usart3.line.to_chip.extend(&request);
-    chip.usart3.line.to_chip[3] |= virtual_board::periph::uart::WRONG_PARITY;
+    chip.usart3.line.to_chip[3] |= stm32g4_unicorn::periph::uart::WRONG_PARITY;
     chip.usart3.wake(chip.now);
     assert!(master.send(&[])?.is_empty());
     // The next frame is accepted.
@@ -273,7 +273,7 @@ fn a_master_that_was_set_up_before_needs_no_other_numbers() -> Result<()> {
     assert!((10..2000).contains(&busy), "{busy} times");
     master.board.run_periods(3000)?;
     assert_eq!(master.read(0x4fff, 1)?, [0], "nothing is staged");
-    master.board.reset(virtual_board::periph::Reset::Pin);
+    master.board.reset(stm32g4_unicorn::periph::Reset::Pin);
     until_said(&mut master.board, "last run")?;
     for (at, value) in WRITTEN {
         assert_eq!(master.float(at)?, value, "{at:#x}");

@@ -6,8 +6,8 @@ use hil_sim::Config;
 use induction_drive::board::CYCLES_PER_US;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use virtual_board::board::CONTROL_INTERRUPT;
 use virtual_board::board::poison::Poison;
-use virtual_board::chip::CONTROL_INTERRUPT;
 use virtual_board::{Counting, Image, Options, Pair};
 
 /// Number of control interrupts that are checked.

@@ -3,7 +3,7 @@
 use crate::common;
 use anyhow::{Result, ensure};
 use induction_drive::monitor::register_check::control;
-use virtual_board::periph::Reset;
+use stm32g4_unicorn::periph::Reset;
 
 /// Registers and bits, one of each peripheral on which the control depends and that nothing else checks.
 const FLIPS: [(&str, u32, u32); 14] = [

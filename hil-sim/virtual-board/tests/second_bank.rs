@@ -8,9 +8,9 @@ use crate::common;
 use anyhow::{Result, ensure};
 use drive_core::Hardware;
 use hil_sim::Config;
-use virtual_board::chip::{CONTROL_INTERRUPT, TICKS_PER_PERIOD};
-use virtual_board::memory::{BANK_2, FLASH, STORED};
-use virtual_board::periph::Reset;
+use stm32g4_unicorn::memory::{BANK_2, FLASH, STORED};
+use stm32g4_unicorn::periph::Reset;
+use virtual_board::board::{CONTROL_INTERRUPT, TICKS_PER_PERIOD};
 use virtual_board::{Board, Image, Options};
 
 /// Code of the second bank. The settings area follows it.

@@ -13,16 +13,17 @@ use hil_sim::Config;
 use hil_sim::board::LogLevel;
 use hil_sim::experiments::drawn_machine::drawn;
 use induction_drive::board::protection;
+use stm32g4_unicorn::chip::Damage;
+use stm32g4_unicorn::circuit::Source as Pin;
+use stm32g4_unicorn::periph::flash::DBANK;
+use stm32g4_unicorn::rules::Rule;
 use virtual_board::board::rom::N_SWBOOT0;
 use virtual_board::board::snapshot::Snapshot;
-use virtual_board::chip::Damage;
 use virtual_board::interactive::pty::Pty;
 use virtual_board::interactive::script::{SILENT, Step};
 use virtual_board::interactive::session::{Inputs, Session};
 use virtual_board::interactive::transcript::Source;
-use virtual_board::periph::flash::DBANK;
-use virtual_board::power_stage::{DcLinkPin, PowerStage};
-use virtual_board::rules::Rule;
+use virtual_board::power_stage::PowerStage;
 use virtual_board::{Board, Image, Options, Shadow};
 
 #[path = "../../../tests/sessions/played.rs"]
@@ -176,11 +177,11 @@ fn at_the_bench(board: &mut Board, name: &str, value: &str) -> Result<Option<Opt
         ("comparator offset", [counts]) => board.chip().comparator_offset = *counts as u16,
         ("dc link", [volts, ..]) => charge(board, *volts)?,
         ("dc link", _) if value == "normal" => {
-            let volts = board.chip().gates.stage.config()?.inverter.dc_link_v;
+            let volts = board.chip().circuit.stage.config()?.inverter.dc_link_v;
             charge(board, volts)?;
         }
         ("dc link", _) => {
-            let stage = board.chip().gates.stage;
+            let stage = board.chip().circuit.stage;
             let settings = stage.firmware_settings();
             let level = protection(stage.board(), &settings).over_voltage;
             charge(board, settings.scales.dc_link.at(level + 100).into())?;
@@ -194,13 +195,13 @@ fn at_the_bench(board: &mut Board, name: &str, value: &str) -> Result<Option<Opt
         ("supply", [volts, ..]) => board.chip().set_supply(*volts),
         ("torn history", _) => board.chip().flash.tear(HISTORY),
         ("chopper", _) => {
-            return Ok(Some(Some(format!("{:.3}", board.chip().chopper_duty()))));
+            return Ok(Some(Some(format!("{:.3}", board.chopper_duty()))));
         }
         ("chopper off", _) => board.chip().tim8.system_break(),
         ("no samples", _) => board.chip().adc.lose_triggers = [u32::MAX; 2],
         ("boot pin not in use", _) => board.chip().flash.options &= !N_SWBOOT0,
         ("gate pins", _) => {
-            let of = board.chip().gates.stage.board();
+            let of = board.chip().circuit.stage.board();
             let connected = of.high.pins.into_iter().chain(of.low.pins).filter(|pin| {
                 let modes = board.chip().gpio[pin.port as usize].read(0).unwrap_or(0);
                 modes >> (2 * pin.number) & 3 == 2
@@ -256,10 +257,10 @@ fn power_up(value: &str) -> Result<Session> {
             "watchdog" => may_be_busy = true,
             "no-cycles" => options.counting.cycles = false,
             "fault-pull" => options.fault_pull_ohm = value.parse()?,
-            "dc-link-driven" => options.dc_link_pin = DcLinkPin::Driven,
+            "dc-link-driven" => options.dc_link_pin = Pin::Driven,
             "dc-link-capacitor" => {
-                let DcLinkPin::Divider { ohm, .. } = stage.dc_link_pin else { bail!("no divider") };
-                options.dc_link_pin = DcLinkPin::Divider { ohm, farad: value.parse()? };
+                let Pin::Divider { ohm, .. } = stage.dc_link_pin else { bail!("no divider") };
+                options.dc_link_pin = Pin::Divider { ohm, farad: value.parse()? };
             }
             "image" | "seed" | "drawn" => {}
             name => ensure!(name.contains('.'), "no such board: {name}"),

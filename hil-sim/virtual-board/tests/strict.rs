@@ -6,10 +6,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use hil_sim::Config;
+use stm32g4_unicorn::cpu::Register;
+use stm32g4_unicorn::periph::Reset;
+use stm32g4_unicorn::rules::{Rule, Violation};
 use virtual_board::board::Debugger;
-use virtual_board::cpu::Register;
-use virtual_board::periph::Reset;
-use virtual_board::rules::{Rule, Violation};
 use virtual_board::{Board, Counting, Image, Options};
 
 /// Largest number of periods that an image needs from reset to its greeting.

@@ -5,9 +5,9 @@ use anyhow::{Result, ensure};
 use hil_sim::Config;
 use hil_sim::console::update;
 use rand::{RngExt as _, SeedableRng as _};
+use stm32g4_unicorn::memory::FLASH;
+use stm32g4_unicorn::periph::Reset;
 use virtual_board::interactive::pty::Pty;
-use virtual_board::memory::FLASH;
-use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
 
 /// Largest number of control periods until the image greets.

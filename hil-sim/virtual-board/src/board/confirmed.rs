@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use induction_drive::{board::settings_address, boards, settings::FirmwareSettings, store::codec};
 
 use super::Options;
-use crate::{memory::STORED, periph::flash::Flash};
+use stm32g4_unicorn::{memory::STORED, periph::flash::Flash};
 
 /// Returns the settings of a board, with the confirmation.
 ///

@@ -4,7 +4,7 @@ use drive_core::{Compare, Hardware, Sample};
 
 use super::Board;
 use crate::addresses::Addresses;
-use crate::cost::{self, Block};
+use stm32g4_unicorn::cost::{self, Block};
 
 /// One control interrupt as observed from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +59,7 @@ impl Board {
     pub(super) fn begin_control(&mut self) {
         let had_order = self.has_order();
         let chip = self.cpu.chip_mut();
-        chip.begin_interrupt();
+        chip.begin_counted();
         let mut hardware = Hardware::empty();
         hardware.set(Hardware::ANALOG_WATCHDOG, chip.adc.over_current());
         hardware.set(Hardware::BREAK, chip.tim1.broken());
@@ -70,7 +70,7 @@ impl Board {
         hardware.set(Hardware::CHOPPER_OFF, chopper_off);
         let [(one, upper_a), (two, upper_b)] = chip.adc.data();
         // With three shunts both ADCs convert the third current as their second channel.
-        let has_shunts = chip.gates.stage.shunts.is_some();
+        let has_shunts = chip.circuit.stage.shunts.is_some();
         let (current_c, slow) = if has_shunts { (one[1], 2) } else { (0, 1) };
         let sample = Sample {
             current_a: one[0] + upper_a,
@@ -94,7 +94,7 @@ impl Board {
         let Some(entered) = self.progress.entered.take() else { return };
         let took_order = entered.had_order && !self.has_order();
         let chip = self.cpu.chip_mut();
-        chip.in_control = false;
+        chip.in_counted = false;
         let (compared, up_to) = chip.compared;
         let way = |blocks: &[Block], accesses: u64| {
             let accesses = (accesses - entered.accesses) as u32;

@@ -3,9 +3,8 @@
 use anyhow::Result;
 
 use super::Board;
-use crate::chip::TICKS_PER_S;
-use crate::chip::debugger::{LOW_POWER, TIM5_STOP, WATCHDOG_STOPS};
-use crate::periph::plain::{DBG_APB1_FZ, DBG_CR};
+use stm32g4_unicorn::chip::TICKS_PER_S;
+use stm32g4_unicorn::chip::debugger::{TIM5_STOP, WATCHDOG_STOPS};
 
 /// A program at the debug port, with the peripherals of APB1 that it stops by DBGMCU while the core is halted. All of
 /// them keep the port alive in low-power modes.
@@ -28,19 +27,12 @@ impl Debugger {
 impl Board {
     /// Attaches a debugger.
     pub fn attach(&mut self, debugger: Debugger) {
-        let debug = &mut self.chip().debug;
-        for (register, bits) in [(DBG_CR, LOW_POWER), (DBG_APB1_FZ, debugger as u32)] {
-            let old = debug.get(register);
-            debug.write(register, old | bits);
-        }
+        self.chip().attach(debugger as u32);
     }
 
     /// Detaches the debugger, and clears the bits of low-power modes.
     pub fn detach(&mut self) {
-        self.resume();
-        let debug = &mut self.chip().debug;
-        let cr = debug.get(DBG_CR);
-        debug.write(DBG_CR, cr & !LOW_POWER);
+        self.chip().detach();
     }
 
     /// Halts the core for some time, ms; [`Board::resume`] continues it.

@@ -2,9 +2,9 @@
 
 use anyhow::{Context, Result, bail, ensure};
 
-use super::{Board, rom};
-use crate::cpu::{Register, Stop};
-use crate::{chip::CONTROL_INTERRUPT, memory, scs};
+use super::{Board, CONTROL_INTERRUPT, rom};
+use stm32g4_unicorn::cpu::{Register, Stop};
+use stm32g4_unicorn::{memory, scs};
 
 impl Board {
     /// Takes the exception that is due.

@@ -6,11 +6,11 @@ use hil_sim::plant::Plant;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{Board, Options};
-use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
+use super::{Board, Chip, Options, TICKS_PER_PERIOD};
 use crate::power_stage::bridge::{Bridge, Leg};
 use crate::power_stage::shunts::{Amplifiers, Currents, Shunts};
 use crate::power_stage::{CODES, channel};
+use stm32g4_unicorn::chip::TICKS_PER_S;
 
 /// A change of the samples.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
@@ -136,19 +136,19 @@ impl Board {
     /// Returns the present gates.
     pub fn gates(&mut self) -> &Bridge {
         let chip = self.cpu.chip_mut();
-        chip.look_at_gates();
-        &chip.gates.bridge
+        chip.follow_pins();
+        &chip.circuit.bridge
     }
 
     /// Makes the outputs take effect at the motor from now on.
     pub(super) fn follow_outputs(&mut self) {
         let chip = self.cpu.chip_mut();
         // A break switches them off without a write.
-        if chip.gates.bridge.outputs_on != chip.tim1.outputs_on() {
-            chip.look_at_gates();
+        if chip.circuit.bridge.outputs_on != chip.tim1.outputs_on() {
+            chip.follow_pins();
         }
-        let (now, compare) = (chip.now, chip.gates.bridge.compare());
-        let seen = (chip.chopper_duty(), chip.relay_pin());
+        let (now, compare) = (chip.now, chip.circuit.bridge.compare());
+        let seen = (self.chopper_duty(), self.is_precharged());
         if seen != self.connection.dc_link {
             self.advance_plant(now);
             self.connection.dc_link = seen;
@@ -159,7 +159,7 @@ impl Board {
             self.advance_plant(now);
             self.connection.applied = compare;
             if let Some(reader) = &mut self.connection.shunts {
-                reader.bridge = self.cpu.chip().gates.bridge.clone();
+                reader.bridge = self.cpu.chip().circuit.bridge.clone();
             }
             if !compare.enabled {
                 self.went_off = Some(now);
@@ -187,8 +187,7 @@ impl Board {
     pub(super) fn crest(&mut self, at: u64) -> Result<()> {
         self.advance_plant(at);
         let chip = self.cpu.chip_mut();
-        chip.look_at_gates();
-        let (bridge, stage) = (&chip.gates.bridge, chip.gates.stage);
+        let (bridge, stage) = (&chip.circuit.bridge, chip.circuit.stage);
         let (outputs_on, dead_time) = (bridge.outputs_on, bridge.dead_time);
         let (pulses, halves) = (bridge.check_pulses(stage), chip.adc.samples_twice());
         self.connection.applied = bridge.compare();
@@ -240,14 +239,14 @@ impl Board {
         if let Some(disturb) = &mut self.disturb {
             disturb(sample);
         }
-        if chip.reference_error != 0.0 {
+        if chip.reference_error() != 0.0 {
             // Half of the reference is the zero of the currents, and the reference supplies the divider of the thermistor.
             let Sample { current_a, current_b, current_c, dc_link, .. } = &mut *sample;
             let zero = CODES / 2.0;
             for (code, zero) in
                 [(current_a, zero), (current_b, zero), (current_c, zero), (dc_link, 0.0)]
             {
-                let seen = zero + (f64::from(*code) - zero) / (1.0 + chip.reference_error);
+                let seen = zero + (f64::from(*code) - zero) / (1.0 + chip.reference_error());
                 *code = seen.min(CODES - 1.0) as u16;
             }
         }

@@ -7,9 +7,9 @@ use drive_settings::{entry::Entry, value::Value};
 use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 
-use crate::cpu::Counting;
-use crate::power_stage::{self, CODES, DcLinkPin, PowerStage, REFERENCE_V};
+use crate::power_stage::{self, CODES, PowerStage, REFERENCE_V};
 use induction_drive::board as firmware_board;
+use stm32g4_unicorn::{Counting, circuit::Source};
 
 /// Options of a board.
 pub struct Options {
@@ -27,7 +27,7 @@ pub struct Options {
     /// The power stage at the pins.
     pub power_stage: &'static PowerStage,
     /// The circuit at the pin of the dc link, by default that of the power stage.
-    pub dc_link_pin: DcLinkPin,
+    pub dc_link_pin: Source,
     /// Resistor of the fault input, ohm, by default that of the power stage.
     pub fault_pull_ohm: f64,
 }

@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 
-use super::Board;
-use crate::chip::{CONTROL_INTERRUPT, TICKS_PER_S};
-use crate::{image::Image, periph::Reset};
+use super::{Board, CONTROL_INTERRUPT};
+use crate::image::Image;
+use stm32g4_unicorn::{chip::TICKS_PER_S, periph::Reset};
 
 impl Board {
     /// Sends a line, without its end, to the console.
@@ -62,8 +62,8 @@ impl Board {
     /// # Errors
     /// A dc-link voltage that the plant refuses.
     pub fn supply_stage(&mut self, on: bool, dc_link_v: f64) -> Result<()> {
-        self.chip().gates.without_supply = !on;
-        self.chip().look_at_gates();
+        self.chip().circuit.without_supply = !on;
+        self.chip().follow_pins();
         self.plant.set_dc_link(dc_link_v)?;
         Ok(())
     }
@@ -94,9 +94,7 @@ impl Board {
 
     /// Lets the power stage release the fault input, or pull it low, which trips.
     pub fn set_fault_pin(&mut self, high: bool) {
-        let chip = self.chip();
-        chip.fault_low = !high;
-        chip.follow_fault_pin();
+        self.chip().pull_break_pin(!high);
     }
 
     /// Stops the crystal, or starts it again.

@@ -3,9 +3,9 @@
 
 use anyhow::{Result, bail};
 
-use super::Board;
-use crate::cpu::{Cpu, Register};
-use crate::memory;
+use super::{Board, Cpu};
+use stm32g4_unicorn::cpu::Register;
+use stm32g4_unicorn::memory;
 
 /// The state of the core before a control interrupt.
 #[derive(PartialEq)]

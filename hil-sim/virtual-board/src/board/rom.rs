@@ -4,20 +4,21 @@
 use std::collections::VecDeque;
 
 use anyhow::{Result, ensure};
-use induction_drive::board::HSI_HZ;
 
 use super::Board;
-use crate::chip::TICKS_PER_S;
-use crate::memory::{FLASH, FLASH_END, STORED, SYSTEM};
-use crate::periph::Reset;
-use crate::periph::flash::{ERASE, PAGE, PROGRAM};
-use crate::periph::rcc::{AHB2ENR, On};
+use stm32g4_unicorn::chip::TICKS_PER_S;
+use stm32g4_unicorn::memory::{FLASH, FLASH_END, STORED, SYSTEM};
+use stm32g4_unicorn::periph::Reset;
+use stm32g4_unicorn::periph::flash::{ERASE, PAGE, PROGRAM};
+use stm32g4_unicorn::periph::rcc::{HSI_HZ, On};
 
 /// Bit nSWBOOT0 of the option bytes (RM0440, FLASH_OPTR).
 pub const N_SWBOOT0: u32 = 1 << 26;
 /// Bit nBOOT0 of the option bytes (RM0440, FLASH_OPTR).
 pub const N_BOOT0: u32 = 1 << 27;
 
+/// Clocks of the ports, in RCC.
+const AHB2ENR: u32 = 0x4c;
 /// Registers of a port.
 const MODER: u32 = 0x00;
 const PUPDR: u32 = 0x0c;
@@ -122,7 +123,7 @@ impl Board {
                 gpio.write(register, others | field << (2 * pin));
             }
         }
-        chip.look_at_gates();
+        chip.follow_pins();
         self.loader = Some(Loader { ready_at: on.at, ..Loader::default() });
         self.hang();
     }

@@ -3,8 +3,8 @@
 use anyhow::{Result, anyhow};
 use hil_sim::plant::Plant;
 
-use super::{Board, Progress, motor::Connection};
-use crate::{chip::Chip, cpu::CoreState, periph::Reset};
+use super::{Board, Chip, Progress, motor::Connection};
+use stm32g4_unicorn::{cpu::CoreState, periph::Reset};
 
 /// Everything that changes on a board.
 pub struct Snapshot {

@@ -4,9 +4,8 @@ use anyhow::{Context, Result};
 use induction_drive::boards::{ANALOG, TERMINALS};
 
 use super::Board;
-use crate::chip::pins::{self, Pin};
-use crate::periph::gpio::Pad;
 use crate::power_stage::{CODES, REFERENCE_V};
+use stm32g4_unicorn::chip::pins::{self, Pin};
 
 /// Voltage at the pins of the reference at 20 mA, across 150 ohm.
 const FULL_V: f64 = 3.0;
@@ -14,7 +13,7 @@ const FULL_V: f64 = 3.0;
 impl Board {
     /// Returns the pins of contacts (0), outputs (1) or analog inputs (2).
     fn terminals(&self, kind: usize) -> impl Iterator<Item = Option<Pin>> + use<> {
-        self.cpu.chip().gates.stage.terminals[kind].split(' ').map(pins::pin)
+        self.cpu.chip().circuit.stage.terminals[kind].split(' ').map(pins::pin)
     }
 
     /// Closes the contacts of these names and opens the others; a number is the current of the reference, mA.
@@ -67,9 +66,8 @@ impl Board {
 
     /// Returns whether RUN, FAULT and BRAKE are active.
     pub fn terminal_outputs(&self) -> [bool; 3] {
-        let gpio = &self.cpu.chip().gpio;
-        let active = |(port, pin): Pin| gpio[port].pad(pin) == Pad::Output(true);
-        let mut outputs = self.terminals(1).map(|pin| pin.is_some_and(active));
+        let chip = self.cpu.chip();
+        let mut outputs = self.terminals(1).map(|pin| pin.is_some_and(|pin| chip.drives_high(pin)));
         std::array::from_fn(|_| outputs.next().unwrap_or(false))
     }
 }

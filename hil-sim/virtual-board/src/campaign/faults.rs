@@ -9,9 +9,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::scene::Target;
 use crate::board::Board;
-use crate::memory::{FLASH, Region, STORED};
 use drive_core::{Line, Sample};
 use drive_settings::CurrentSensors;
+use stm32g4_unicorn::memory::{FLASH, Region, STORED};
 
 /// Selects the ADC counts of a quantity in a sample.
 type Code = fn(&mut Sample) -> &mut u16;

@@ -12,11 +12,11 @@ use induction_drive::store::{Flash, FlashError, Saved};
 use serde::Deserialize;
 
 use crate::board::{Board, Options};
-use crate::memory::{Region, STORED};
 use crate::{
-    addresses::Addresses, board::snapshot::Snapshot, chip::Chip, image::Image, pair::Pair,
+    addresses::Addresses, board::Chip, board::snapshot::Snapshot, image::Image, pair::Pair,
     power_stage::PowerStage,
 };
+use stm32g4_unicorn::memory::{Region, STORED};
 
 /// q-axis current before the injection of a fault, A on the dissertation's motor. At speed its sign also makes the motor generate.
 const TORQUE_A: f64 = 1.5;
@@ -240,7 +240,7 @@ pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
         "settings outside the part that can be written"
     );
     let mut chip = board.chip().clone();
-    let defaults = FirmwareSettings::of(chip.gates.stage.board());
+    let defaults = FirmwareSettings::of(chip.circuit.stage.board());
     let Ok(Some(settings)) = Saved::load(Bank(&mut chip), &defaults).1 else {
         bail!("no whole settings in the flash");
     };

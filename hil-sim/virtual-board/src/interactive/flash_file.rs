@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use hil_sim::Error;
 
-use crate::memory::{FLASH_END, STORED};
-use crate::periph::flash::Flash;
+use stm32g4_unicorn::memory::{FLASH_END, STORED};
+use stm32g4_unicorn::periph::flash::Flash;
 
 /// First bytes of the file, including its version.
 const MARK: &[u8; 16] = b"virtual flash 2\n";

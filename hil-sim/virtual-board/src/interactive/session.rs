@@ -15,10 +15,10 @@ use induction_drive::console::line::UNASKED;
 use super::script::{ANSWER_S, Script, Step, failure};
 use super::transcript::{Assembler, Line, Source};
 use super::{flash_file::FlashFile, own::Own, pty::Pty, record::Record};
-use crate::board::{Board, Period};
-use crate::chip::{TICKS_PER_PERIOD as PERIOD, TICKS_PER_S};
-use crate::periph::Reset;
+use crate::board::{Board, Period, TICKS_PER_PERIOD as PERIOD};
 use crate::shadow::Shadow;
+use stm32g4_unicorn::chip::TICKS_PER_S;
+use stm32g4_unicorn::periph::Reset;
 
 /// Number of control periods between two exchanges with the inputs: 5 ms, which a person does not notice.
 const SLICE: u32 = 30;

@@ -1,10 +1,11 @@
 //! The boards, each with its sources. "Assumed" marks a value that no source gives.
 
 use drive_settings::Ntc;
+use stm32g4_unicorn::circuit::{Pull, Source};
 
-use super::driver::{Driver, Input, Pull};
+use super::driver::{Driver, Input};
 use super::shunts::Shunts;
-use super::{DcLinkPin, GateLimits, PowerStage, Switches};
+use super::{GateLimits, PowerStage, Switches};
 
 /// All boards.
 pub const ALL: [&PowerStage; 4] = [&REFERENCE, &IHM08M1, &IHM023V3, &IPMM10B];
@@ -62,7 +63,7 @@ pub const REFERENCE: PowerStage = PowerStage {
     // Switches of a drive for 230 V (assumed).
     switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
     // No capacitor (assumed).
-    dc_link_pin: DcLinkPin::Divider { ohm: 10e3, farad: 0.0 },
+    dc_link_pin: Source::Divider { ohm: 10e3, farad: 0.0 },
     // The pull-up that the documentation requires (assumed on all boards).
     fault_pull_ohm: 4700.0,
     analog_only: &[],
@@ -89,7 +90,7 @@ const IHM08M1: PowerStage = PowerStage {
     limits: GateLimits { dead_time_s: 300e-9, pulse_s: 300e-9 },
     switches: Switches { rated_v: 60.0, ringing_v_per_a: RINGING },
     // 169 kOhm in parallel with 9.31 kOhm. It is not known whether there is a capacitor.
-    dc_link_pin: DcLinkPin::Divider { ohm: 8.82e3, farad: 0.0 },
+    dc_link_pin: Source::Divider { ohm: 8.82e3, farad: 0.0 },
     analog_only: &[(0, 11), (1, 14), (1, 15)],
     terminals: ["B5 B7 B9 - C7 - -", "- - -", "B12 - B13"],
     shunts: Some(Shunts { volts_per_a: -0.010 * 5.18, zero_v: 1.71, ..AMPLIFIERS }),

@@ -6,8 +6,8 @@ use thiserror::Error;
 
 use super::PowerStage;
 use super::driver::Driver;
-use crate::periph::tim1::{Tim1, Wave};
-use crate::{periph::gpio::Gpio, time::TICKS_PER_S};
+use stm32g4_unicorn::periph::tim1::{Tim1, Wave};
+use stm32g4_unicorn::{chip::TICKS_PER_S, periph::gpio::Gpio};
 
 /// Names of the switches of a leg.
 const SIDES: [&str; 2] = ["high", "low"];

@@ -1,22 +1,9 @@
 //! The gate drivers: levels at their inputs, and whether these request on.
 
 use super::{GATE_FUNCTION, GATE_PINS};
-use crate::periph::gpio::{Gpio, Pad};
-use crate::periph::tim1::{Output, Tim1, Wave};
-
-/// The chip's own resistors, ohm (datasheet: 25 to 55 kOhm).
-pub const CHIP_PULL_OHM: f64 = 40e3;
-/// Supply of the chip, V.
-pub const CHIP_V: f64 = 3.3;
-
-/// A resistor to a voltage.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pull {
-    /// Voltage, V.
-    pub volts: f64,
-    /// Resistance, ohm.
-    pub ohm: f64,
-}
+use stm32g4_unicorn::circuit::{PULL_OHM, Pull, SUPPLY_V, level};
+use stm32g4_unicorn::periph::gpio::{Gpio, Pad};
+use stm32g4_unicorn::periph::tim1::{Output, Tim1, Wave};
 
 /// An input of a driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,23 +33,11 @@ pub struct Driver {
 /// not defined: on or off.
 pub type Request = Option<Wave>;
 
-/// Returns the level that resistors set: low below the first threshold, high above the second, none in between.
-pub fn level(pulls: impl Iterator<Item = Pull> + Clone, thresholds: (f64, f64)) -> Option<bool> {
-    let conductance: f64 = pulls.clone().map(|pull| 1.0 / pull.ohm).sum();
-    let volts = pulls.map(|pull| pull.volts / pull.ohm).sum::<f64>() / conductance;
-    // Without any resistor the voltage is not a number, which is neither level.
-    match thresholds {
-        (low, _) if volts < low => Some(false),
-        (_, high) if volts > high => Some(true),
-        _ => None,
-    }
-}
-
 impl Input {
     /// Returns the level of a pin that nothing drives except the chip's own resistor.
     pub fn level(&self, chip_pull: Option<bool>) -> Option<bool> {
         let chip =
-            chip_pull.map(|up| Pull { volts: if up { CHIP_V } else { 0.0 }, ohm: CHIP_PULL_OHM });
+            chip_pull.map(|up| Pull { volts: if up { SUPPLY_V } else { 0.0 }, ohm: PULL_OHM });
         level(self.pull.into_iter().chain(chip), self.thresholds)
     }
 

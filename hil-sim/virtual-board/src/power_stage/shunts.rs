@@ -9,7 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::bridge::{Bridge, Piece};
 use super::{CODES, REFERENCE_V};
-use crate::time::TICKS_PER_S;
+use stm32g4_unicorn::chip::TICKS_PER_S;
 
 /// Shunts and amplifiers; those of the legs a, b, c are alike except for their errors.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,10 @@
 //! The check of the gates: it runs whenever anything changes on which the gates depend.
 
-use super::PowerStage;
 use super::bridge::{BadGates, Bridge};
-use crate::periph::gpio::{Gpio, Pad};
-use crate::periph::tim1::Tim1;
+use super::{PowerStage, REFERENCE};
+use stm32g4_unicorn::circuit::Circuit;
+use stm32g4_unicorn::periph::gpio::{Gpio, Pad};
+use stm32g4_unicorn::periph::tim1::Tim1;
 
 /// A violation, with its place and time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,9 +39,17 @@ impl GateWatch {
     pub fn take(&mut self) -> Option<Seen> {
         self.seen.take()
     }
+}
 
-    /// Checks the gates, with the core's position `at` and the time.
-    pub fn look(&mut self, gpio: &[Gpio], tim1: &Tim1, at: u32, time: u64) {
+impl Default for GateWatch {
+    fn default() -> Self {
+        Self::new(&REFERENCE, &[0, 1, 2, 3, 4, 5, 6].map(Gpio::new), &Tim1::default())
+    }
+}
+
+/// Checks the gates.
+impl Circuit for GateWatch {
+    fn follow(&mut self, gpio: &[Gpio; 7], tim1: &Tim1, at: u32, time: u64) {
         self.bridge = Bridge::new(self.stage, gpio, tim1);
         if self.without_supply {
             self.bridge.legs = Default::default();
