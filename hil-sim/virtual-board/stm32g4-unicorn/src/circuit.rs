@@ -9,6 +9,34 @@ pub const PULL_OHM: f64 = 40e3;
 
 /// A circuit that follows the digital pins of the chip. Its inputs to the chip are fields and methods of
 /// [`Chip`](crate::Chip).
+///
+/// ```
+/// use stm32g4_unicorn::periph::{Reset, gpio::Gpio, gpio::Pad, tim1::Tim1};
+/// use stm32g4_unicorn::{Chip, Circuit};
+///
+/// /// A light-emitting diode at PA5.
+/// #[derive(Default)]
+/// struct Led {
+///     is_lit: bool,
+/// }
+///
+/// impl Circuit for Led {
+///     fn follow(&mut self, ports: &[Gpio; 7], _: &Tim1, _: u32, _: u64) {
+///         self.is_lit = ports[0].pad(5) == Pad::Output(true);
+///     }
+/// }
+///
+/// let mut chip = Chip::<Led>::default();
+/// // The clock of the port, then MODER and BSRR.
+/// for (address, value) in [(0x4002_104c, 1), (0x4800_0000, 1 << 10), (0x4800_0018, 1 << 5)] {
+///     assert!(!chip.circuit.is_lit);
+///     chip.write(address, 4, value);
+///     chip.now += 100;
+/// }
+/// assert!(chip.circuit.is_lit);
+/// chip.reset(Reset::Pin);
+/// assert!(!chip.circuit.is_lit);
+/// ```
 pub trait Circuit: Default + 'static {
     /// Follows the ports A to G and the outputs of TIM1. The chip calls it after each write that may have changed them
     /// and at each top of the counter, with the last known position of the core `at` and the time `now`, ticks.

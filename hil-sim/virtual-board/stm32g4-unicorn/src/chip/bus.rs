@@ -2,8 +2,7 @@
 
 use thiserror::Error;
 
-use super::{Chip, OWN_REFERENCE_CODE, pins};
-use crate::circuit::Circuit;
+use super::{Chip, Circuit, OWN_REFERENCE_CODE, pins};
 use crate::memory;
 use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, On};
 use crate::periph::{Effect, Reset, gpio::IDR, uart};

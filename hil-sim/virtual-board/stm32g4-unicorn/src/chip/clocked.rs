@@ -1,7 +1,6 @@
 //! The clocks of the peripherals, and the rules between clock tree, supply and flash.
 
-use super::{Chip, bus::clock_of};
-use crate::circuit::Circuit;
+use super::{Chip, Circuit, bus::clock_of};
 use crate::rules::Rule;
 
 /// Number of cycles from the store that switches a clock on to the first store that takes effect: two whole cycles lie between.

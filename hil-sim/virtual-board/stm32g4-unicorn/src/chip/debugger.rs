@@ -1,7 +1,6 @@
 //! A debugger at the debug port: it halts and continues the core, and sets and clears bits of DBGMCU.
 
-use super::{Chip, TICKS_PER_S};
-use crate::circuit::Circuit;
+use super::{Chip, Circuit, TICKS_PER_S};
 use crate::periph::bits;
 use crate::periph::plain::{DBG_APB1_FZ, DBG_APB2_FZ, DBG_CR};
 use crate::rules::Rule;

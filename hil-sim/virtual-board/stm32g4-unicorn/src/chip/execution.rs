@@ -1,7 +1,6 @@
 //! The execution of code: its time, and the stored blocks.
 
-use super::Chip;
-use crate::circuit::Circuit;
+use super::{Chip, Circuit};
 use crate::cost::{self, Block};
 use crate::{memory::Region, periph::plain, scs};
 

@@ -1,7 +1,7 @@
 //! The nets at two pins of the chip, and their observers: PA1 with the comparators, and PA6 with the break of TIM1.
 
-use super::{CODES, Chip, Damage, TICKS_PER_S};
-use crate::circuit::{Circuit, PULL_OHM, Pull, SUPPLY_V, Source, level};
+use super::{CODES, Chip, Circuit, Damage, TICKS_PER_S};
+use crate::circuit::{PULL_OHM, Pull, SUPPLY_V, Source, level};
 use crate::periph::{NEVER, dac::Dac};
 use crate::rules::Rule;
 

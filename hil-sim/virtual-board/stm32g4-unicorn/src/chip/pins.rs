@@ -2,8 +2,7 @@
 
 use std::sync::LazyLock;
 
-use super::Chip;
-use crate::circuit::Circuit;
+use super::{Chip, Circuit};
 use crate::{periph::gpio::Pad, rules::Rule};
 
 /// A pin: its port (A is 0), and its number.

@@ -1,7 +1,6 @@
 //! The supply: monitor, brown-out reset, and the break of TIM1 that follows the monitor.
 
-use super::Chip;
-use crate::circuit::Circuit;
+use super::{Chip, Circuit};
 use crate::periph::{Reset, plain};
 use crate::rules::Rule;
 

@@ -1,7 +1,6 @@
 //! Exception entry and return: the stack frames (ARMv7-M, B1.5), and the registers that they hold.
 
-use super::{Cpu, Register as R};
-use crate::circuit::Circuit;
+use super::{Circuit, Cpu, Register as R};
 
 /// Bit of EXC_RETURN: a frame without floating-point registers.
 const BASIC_FRAME: u32 = 1 << 4;

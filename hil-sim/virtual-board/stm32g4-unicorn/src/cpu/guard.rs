@@ -7,9 +7,7 @@ use std::rc::Rc;
 use unicorn_engine::Unicorn;
 use unicorn_engine::unicorn_const::{Permission, uc_error};
 
-use super::Cpu;
-use crate::chip::Chip;
-use crate::circuit::Circuit;
+use super::{Chip, Circuit, Cpu};
 use crate::memory::{GUARD_PAGE, Region};
 
 /// The page whose accesses go through the model.
