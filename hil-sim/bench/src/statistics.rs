@@ -66,6 +66,8 @@ pub fn whole<S: Study>(context: &Context<'_>) -> Result<Outcome, Error> {
     study.outcome(context, records)
 }
 
+/// Stored records of runs, by the number of the run.
+pub type Stored = BTreeMap<usize, Value>;
 /// A function that stores the record of a run.
 pub type Keep<'a> = &'a (dyn Fn(usize, Value) -> Result<(), Error> + Sync);
 
@@ -75,7 +77,7 @@ pub struct Statistical {
     pub runs: fn(&Context<'_>) -> Result<usize, Error>,
     /// Does the runs that have no stored record on all cores, passes each record on as soon as it is complete, and computes the
     /// outcome of all runs.
-    pub resumed: fn(&Context<'_>, &BTreeMap<usize, Value>, Keep<'_>) -> Result<Outcome, Error>,
+    pub resumed: fn(&Context<'_>, &Stored, Keep<'_>) -> Result<Outcome, Error>,
 }
 
 impl Statistical {
@@ -87,7 +89,7 @@ impl Statistical {
 
 fn resumed<S: Study>(
     context: &Context<'_>,
-    stored: &BTreeMap<usize, Value>,
+    stored: &Stored,
     keep: Keep<'_>,
 ) -> Result<Outcome, Error> {
     let (study, runs) = S::new(context)?;
