@@ -3,7 +3,8 @@
 use anyhow::{Context, Result, anyhow};
 use defmt_decoder::{DecodeError, Table};
 
-use crate::{board::Cpu, image::Image};
+use crate::{image::Image, power_stage::watch::GateWatch};
+use stm32g4_unicorn::Cpu;
 use stm32g4_unicorn::memory::{self, Region};
 
 /// Offset of up-buffer 0 in the control block: after its ID and two counts.
@@ -39,7 +40,7 @@ impl Log {
     ///
     /// # Errors
     /// The log cannot be decoded.
-    pub fn take(&mut self, cpu: &mut Cpu) -> Result<Vec<String>> {
+    pub fn take(&mut self, cpu: &mut Cpu<GateWatch>) -> Result<Vec<String>> {
         let at = self.control_block + BUFFER;
         let words = [1, 2, 3, 4].map(|n| cpu.word(at + 4 * n));
         let [Some(buffer), Some(size), Some(written), Some(mut next)] = words else {

@@ -15,6 +15,7 @@ pub use execution::Watched;
 
 use crate::circuit::{Circuit, SUPPLY_V};
 use crate::cost::Block;
+pub use crate::periph::rcc::TICKS_PER_S;
 use crate::periph::tim1::{Event, Tim1};
 use crate::periph::uart::{self, Uart};
 use crate::periph::{NEVER, Reset, Store, plain};
@@ -28,8 +29,6 @@ use debugger::{Halt, IWDG_STOP, WWDG_STOP};
 use nets::AnalogNet;
 use pins::Pin;
 
-/// Ticks per second.
-pub const TICKS_PER_S: u64 = 170_000_000;
 /// Number of counts of an ADC.
 pub const CODES: f64 = 4096.0;
 

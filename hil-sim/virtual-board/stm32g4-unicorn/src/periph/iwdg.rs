@@ -1,7 +1,6 @@
 //! The independent watchdog (RM0440, section 42).
 
-use super::{Effect, NEVER, Store, offsets};
-use crate::chip::TICKS_PER_S;
+use super::{Effect, NEVER, Store, offsets, rcc::TICKS_PER_S};
 use crate::rules::{Rule, Rules};
 
 offsets! { PR = 0x04, RLR = 0x08, SR = 0x0c, WINR = 0x10 }

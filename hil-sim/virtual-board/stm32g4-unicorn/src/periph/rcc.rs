@@ -2,7 +2,9 @@
 //! crystal.
 
 use super::{Effect, NEVER, Reset, Store, bits, offsets};
-use crate::chip::TICKS_PER_S;
+
+/// Ticks per second.
+pub const TICKS_PER_S: u64 = 170_000_000;
 
 offsets! {
     CR = 0x00, CFGR = 0x08, PLLCFGR = 0x0c, CIFR = 0x1c, CICR = 0x20, AHB1ENR = 0x48, AHB2ENR = 0x4c, APB1ENR1 = 0x58,
