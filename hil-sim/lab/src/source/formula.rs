@@ -7,9 +7,10 @@
 /// The operators. Each one has precedence over those before it, so `a*b/c` is `a*(b/c)`.
 const OPERATORS: &str = "<>+-*/^";
 
+type Function = fn(f64) -> f64;
 /// The functions, by name.
 #[rustfmt::skip]
-const FUNCTIONS: [(&str, fn(f64) -> f64); 8] = [
+const FUNCTIONS: [(&str, Function); 8] = [
     ("abs", f64::abs), ("atan", f64::atan), ("cos", f64::cos), ("exp", f64::exp),
     ("ln", f64::ln), ("sin", f64::sin), ("sqrt", f64::sqrt), ("tan", f64::tan),
 ];
