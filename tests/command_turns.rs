@@ -126,7 +126,6 @@ impl Bench {
                 assert!((other.current - first.current).abs() < 0.35, "{name}");
             }
         }
-        println!("{}: {taken} of {} taken", self.name, self.commands.len());
         taken
     }
 }

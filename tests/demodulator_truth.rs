@@ -134,9 +134,7 @@ fn the_printed_chain_is_blind_and_the_rectified_is_not() {
         mean(-2, 347);
         mean(0, 276);
         let after = mean(0, 10);
-        let change = after.0 - before.0;
-        println!("{demodulator}: {before:?} -> {after:?}");
-        change
+        after.0 - before.0
     };
     assert!(moved_by("literal").abs() < 0.1);
     assert!(moved_by("rectified").abs() > 5.0);

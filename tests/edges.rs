@@ -193,7 +193,6 @@ fn a_coasting_stop_is_off_within_200_ms_whatever_is_set() {
         "stop.coasts_s=3600",
     ];
     let shafts = [vec!["load.mode=locked"], vec!["load.mode=speed", "load.speed_rpm=100"]];
-    let mut worst = (0, String::new());
     for (setting, shaft, (from, way)) in settings
         .into_iter()
         .flat_map(|setting| shafts.iter().map(move |shaft| (setting, shaft)))
@@ -247,13 +246,8 @@ fn a_coasting_stop_is_off_within_200_ms_whatever_is_set() {
             _ => 400 + OFF_MS,
         };
         let took = stand.off_within(patience);
-        let took = took.unwrap_or_else(|| panic!("{what}: on after {patience} ms"));
-        let took = took.saturating_sub(patience - OFF_MS);
-        if took > worst.0 {
-            worst = (took, what);
-        }
+        assert!(took.is_some(), "{what}: on after {patience} ms");
     }
-    println!("longest: {} ms by {}", worst.0, worst.1);
 }
 
 /// `stop now`, disable voltage of CiA 402, the base block and ENABLE set to `now` switch off in the same pass, from full torque.

@@ -11,8 +11,7 @@ use hil_sim::stats::Stats;
 
 fn learned(changes: &[&str], seed: u64) -> Learned {
     let learned = learning::learned(&config(changes), seed).unwrap();
-    println!("{changes:?}: {learned:?}");
-    assert!(learned.verdict.is_accepted());
+    assert!(learned.verdict.is_accepted(), "{changes:?}: {learned:?}");
     learned
 }
 
@@ -56,11 +55,10 @@ fn after_learning_a_mismatch_costs_no_accuracy() {
     let mismatch = ["runs=24", "measurement.gain_error_a=0.01"];
     let before = run("monte-carlo", &mismatch, 41).metrics;
     let after = run("monte-carlo", &all(&[&mismatch, &["prepare.learn=true"]]), 41).metrics;
-    println!("{before:?}\n{after:?}");
     let rms = |m: &hil_sim::outcome::Metrics| m.get("angle_error_rms_deg").unwrap();
     // 4.0 before, 1.5 after over 300 runs.
-    assert!(rms(&before) > 3.0);
-    assert!(rms(&after) <= 2.3);
+    assert!(rms(&before) > 3.0, "{before:?}");
+    assert!(rms(&after) <= 2.3, "{after:?}");
     assert!(after.get("worst_run_rms_deg").unwrap() <= 3.2);
     assert_eq!(after.get("lost_runs"), Some(0.0));
 }
@@ -73,9 +71,8 @@ fn a_shaft_that_moves_is_refused() {
     for load in [Load::Free { torque: 0.0 }, Load::Speed { speed: 6.0 }] {
         let mut rig = Rig::from_config(&config, 5).unwrap();
         rig.set_load(load).unwrap();
-        let error = rig.learn().unwrap_err().to_string();
-        println!("{load:?} after {:.1} s: {error}", rig.time());
-        assert_eq!(rig.drive.state(), State::Fault(Fault::ShaftNotLocked));
+        let error = rig.learn().unwrap_err();
+        assert_eq!(rig.drive.state(), State::Fault(Fault::ShaftNotLocked), "{load:?}: {error}");
         assert!(rig.drive.learned().is_none());
         assert!(rig.time() < 35.0);
     }

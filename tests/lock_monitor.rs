@@ -7,7 +7,6 @@ use drive_core::{Command, Fault, Mode, State};
 #[test]
 fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
     let outcome = run("lock-monitor", &["runs=12"], 31);
-    println!("{:?}", outcome.metrics);
     for metric in [
         "not_in_time_p90",
         "not_in_time_m90",

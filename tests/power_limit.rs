@@ -62,7 +62,6 @@ const M4B: &[&str] = &["plant=m4b", "flux_level=high", "sequence.flux=high", "pr
 /// Four quadrants, both models, with the encoder and without. Measured: within 0.5 %.
 #[test]
 fn the_dc_current_is_within_three_percent_of_its_limits() {
-    let mut worst = 0.0_f64;
     for (motor, source, seed) in [
         (A, "encoder", 1),
         (A, "injection", 2),
@@ -95,11 +94,9 @@ fn the_dc_current_is_within_three_percent_of_its_limits() {
                 // There is no chatter, and the step overshoots by less than a tenth.
                 assert!(seen.i_q_most - seen.i_q_least < 0.2, "{changes:?} {seen:?}");
                 assert!(beyond < 0.1 * limit.abs() + 0.01, "{changes:?} {rpm} {i_q}: {beyond} A");
-                worst = worst.max(error.abs());
             }
         }
     }
-    println!("worst {worst:.4}");
 }
 
 /// The power is held while the speed passes through all quadrants, with the requested torque where the power allows it.

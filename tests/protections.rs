@@ -58,8 +58,7 @@ fn a_dead_encoder_switches_off() {
         let mut rig = regulating(&config, 1, 2.0, 0.5);
         rig.plant.set_encoder_fault(EncoderFault::Stuck);
         let (took, found, peak) = until_off(&mut rig, 6000);
-        println!("{rpm} rpm: {found:?} after {took} periods, {peak:.2} A");
-        assert!(found.is_some() && took < 300, "{rpm} rpm");
-        assert!(peak < RANGE_A);
+        assert!(found.is_some() && took < 300, "{rpm} rpm: {found:?} after {took} periods");
+        assert!(peak < RANGE_A, "{rpm} rpm: {peak} A");
     }
 }

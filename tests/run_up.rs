@@ -39,7 +39,6 @@ fn all_reach(changes: &[&str]) {
     for motor in Motor::all().into_iter().filter(learns) {
         for inertia in [&[][..], &["drive.motor.inertia=auto"]] {
             let found = run_up(&motor.name, &[changes, inertia].concat());
-            println!("{} {changes:?} {inertia:?}: {found:.2?}", motor.name);
             assert!(
                 found.is_ok_and(|(s, most)| s < LONGEST_S && most < 1.1),
                 "{} {changes:?} {inertia:?}: {found:?}",

@@ -108,9 +108,11 @@ fn with_the_encoder_the_speed_is_exact() {
     rig.set_load(Load::Free { torque: 0.6 }).unwrap();
     let (_, dip, _) = watch(&mut rig, 600.0, 1.0);
     let (mean, most, angle) = watch(&mut rig, 600.0, 0.5);
-    println!("encoder: dip {dip:.1}, then {mean:.3}, {most:.3} rpm; {angle:.2} deg");
     // One count in 10 ms is 0.6 rpm.
-    assert!(dip < 30.0 && mean.abs() < 0.1 && most < 1.0 && angle < 1.0);
+    assert!(
+        dip < 30.0 && mean.abs() < 0.1 && most < 1.0 && angle < 1.0,
+        "{dip} {mean} {most} {angle}"
+    );
     let truth = rig.rpm();
     assert!((truth - 600.0).abs() < 1.0, "{truth}");
 }

@@ -24,8 +24,7 @@ fn a_tenth_of_the_saliency_gives_tens_of_degrees() {
 #[test]
 fn negative_torque_works_as_well() {
     let outcome = run("torque-steps", &["reference.iq_a=-1"], 4);
-    println!("{:?}", outcome.metrics);
-    assert_eq!(outcome.metrics.get("lost"), Some(0.0));
+    assert_eq!(outcome.metrics.get("lost"), Some(0.0), "{:?}", outcome.metrics);
     assert!(outcome.steps.unwrap().iter().all(|s| s.torque_nm < -0.2));
 }
 

@@ -66,9 +66,6 @@ fn motors_turn_by_their_nameplates() {
             rig.set_load(Load::Free { torque: sign * torque }).unwrap();
             rig.wait(1.0);
             let (loaded, loaded_peak) = seen(&mut rig);
-            println!(
-                "{motor:?} {rpm:.0} rpm: {free:.1}, loaded {loaded:.1}; {peak:.2} A of {limit:.2}"
-            );
             assert_eq!(rig.drive.state(), State::VoltsPerHertz, "{motor:?}");
             assert!((free - rpm).abs() < 0.01 * rated_rpm, "{motor:?}: {free} of {rpm}");
             assert!((loaded - rpm).abs() < 0.03 * rated_rpm, "{motor:?}: {loaded} of {rpm}");
@@ -90,7 +87,6 @@ fn a_load_beyond_the_limit_switches_off() {
         rig.set_load(Load::Locked).unwrap();
         let mut peak = 0.0_f64;
         rig.run(4.0, |p| peak = peak.max(p.current));
-        println!("{:?}, {peak:.2} A", rig.drive.state());
         assert!(matches!(rig.drive.state(), State::Fault(_)), "{}", rig.drive.state());
         // The trip, and one more period in which the current rises.
         assert!(peak < 1.3 * f64::from(config.drive.trip_a()), "{peak}");
@@ -151,7 +147,6 @@ fn braking_keeps_the_link_below_its_limit() {
         most = most.max(f64::from(rig.drive.telemetry().dc_link));
     }
     let rpm = seen(&mut rig).0;
-    println!("{rpm:.1} rpm, at most {most:.0} V, {}", rig.drive.state());
     assert!(most < f64::from(config.drive.dc_over_v()) && rpm.abs() < 20.0, "{most} {rpm}");
     assert_eq!(rig.drive.state(), State::VoltsPerHertz);
 }
@@ -169,7 +164,6 @@ fn a_hot_heat_sink_takes_torque_and_is_named() {
             rig.wait(0.01);
             limiting += u32::from(rig.drive.limiting() == why);
         }
-        println!("{celsius} degC: {limiting} of 200, {}", rig.drive.state());
         assert!(limiting > 100, "{limiting}");
     }
 }
@@ -182,14 +176,12 @@ fn a_power_limit_takes_speed() {
     let mut rig = turning(&config, 900.0, 1);
     rig.set_load(Load::Free { torque: 4.0 }).unwrap();
     rig.wait(2.0);
-    let (mut watts, mut limiting) = (0.0, 0);
+    let mut watts = 0.0;
     for _ in 0..6000 {
         rig.step();
         watts += rig.plant.dc_current(1.0 / 6000.0) * rig.plant.dc_link() / 6000.0;
-        limiting += u32::from(rig.drive.limiting() == Limiting::Power);
     }
     let rpm = seen(&mut rig).0;
-    println!("{watts:.0} W, {rpm:.0} rpm, limiting {limiting}");
     assert_eq!(rig.drive.state(), State::VoltsPerHertz);
     assert!((160.0..220.5).contains(&watts) && rpm > 150.0, "{watts} W, {rpm} rpm");
 }

@@ -241,7 +241,6 @@ fn deviations_are_the_scatter_of_the_result_and_grow_when_the_model_is_wrong() {
         let middle = mean(&|x| x[n]);
         let scatter = (mean(&|x| (x[n] - middle).powi(2)) * 6.0 / 5.0).sqrt();
         let stated = mean(&|x| x[n + 2]);
-        println!("{scatter:.2e}, stated {stated:.2e}");
         assert!((0.4..2.5).contains(&(stated / scatter)), "{stated} for {scatter}");
     }
     // With saturating leakage inductances, parts of one record differ by far more than its noise.
@@ -253,7 +252,6 @@ fn deviations_are_the_scatter_of_the_result_and_grow_when_the_model_is_wrong() {
     let [whole, part] = [0.0, 0.25].map(|from| of(&saturating, 1, from));
     for n in 0..2 {
         let apart = (whole[n] - part[n]).abs();
-        println!("{whole:?} {part:?}");
         assert!(apart < 3.0 * whole[n + 2].hypot(part[n + 2]), "{whole:?} and {part:?}");
         assert!(whole[n + 2] > 5.0 * all[0][n + 2], "{whole:?}");
     }
@@ -287,7 +285,6 @@ fn a_recorded_start_is_compared() {
         let output = hil_sim(&folder, &[&run[..], more].concat());
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
         let share = object(&output)["metrics"]["start_current_percent"].as_f64().expect("a share");
-        println!("{share} %");
         assert!(bounds.contains(&share), "{share} %");
     }
 }

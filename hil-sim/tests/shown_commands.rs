@@ -43,12 +43,13 @@ fn commands_of_the_documents_run() {
         }
     }
     let folder = folder("documents");
-    let (mut ran, mut left) = (0, 0);
+    let mut ran = 0;
     for (command, document) in &commands {
         let document = document.display();
         if elsewhere(command).is_some() {
-            left += 1;
-        } else if let Some(arguments) = command.strip_prefix("cargo sim") {
+            continue;
+        }
+        if let Some(arguments) = command.strip_prefix("cargo sim") {
             let arguments: Vec<_> = arguments.split_whitespace().map(of_repository).collect();
             let arguments: Vec<_> = arguments.iter().map(String::as_str).collect();
             let output = hil_sim(&folder, &arguments);
@@ -60,7 +61,6 @@ fn commands_of_the_documents_run() {
             wrong.push(format!("{document}: `{command}` neither runs here nor stands in a list"));
         }
     }
-    println!("{ran} commands ran, {left} stand in the list with a reason");
     assert!(wrong.is_empty() && ran > 20, "{ran} ran\n{}", wrong.join("\n"));
 }
 

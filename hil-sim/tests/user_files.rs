@@ -58,7 +58,6 @@ fn a_simulated_trace_is_identified() {
         let output = hil_sim(&folder, &["identify-trace", "--input", name, "--json"]);
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
         let metrics = object(&output)["metrics"].clone();
-        println!("{metrics}");
         for (metric, truth, share) in [
             ("r_s_ohm", r_s, 0.02),
             ("tau_r_s", tau_r, 0.02),

@@ -29,10 +29,6 @@ fn pages_fit_and_can_be_read() {
                 "Math.min(99, ...[...document.querySelectorAll('.plot text')].map(text => (to => \
                  parseFloat(getComputedStyle(text).fontSize) * Math.hypot(to.a, to.b))(text.getScreenCTM())))",
             );
-            println!(
-                "{}, {view}: {content} px wide, smallest text of a plot {text:.1} px",
-                path.display()
-            );
             if content > f64::from(width) || text < SMALLEST_PX {
                 wrong.push(format!(
                     "{}, {view}: {content} px wide, text {text:.1} px",

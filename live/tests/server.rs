@@ -246,12 +246,7 @@ fn a_page_that_closes_or_falls_silent_stops_the_drive_in_time() {
             Some(page)
         };
         let after = served.waits_for("stop") - left;
-        println!(
-            "stop {} ms after the page {}",
-            after.as_millis(),
-            if closes { "closed" } else { "fell silent" }
-        );
-        assert!(after < Duration::from_millis(500), "{after:?}");
+        assert!(after < Duration::from_millis(500), "{after:?}, closed: {closes}");
         drop(kept);
     }
 }

@@ -94,7 +94,6 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
         first = first.min(page.number(&format!("{picture}.startTime")));
         page.close();
     }
-    println!("first picture {first:.0} ms behind the beginning of the load");
 
     let mut page = browser.open(&address);
     page.until("/[*] learned: slope/.test($('log').textContent)", PATIENCE);
@@ -150,7 +149,6 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     ));
     page.until("!!globalThis.measured", PATIENCE);
     let faster = page.number("measured[0]");
-    println!("{faster:.0} times as fast as the clock");
     let mut here = Talk::learning(7).unwrap();
     here.advance(MEASURED_MS);
     let fingerprint = here.board.machine.fingerprint.to_string();

@@ -151,9 +151,9 @@ fn the_voltages_of_every_board_are_in_order() {
             let comparator = settings.scales.dc_link.at(protection(board, &settings).over_voltage);
             let [nominal, end, trip] =
                 [settings.inverter.dc_link_v, settings.dc_high_v(), settings.dc_over_v()];
-            println!("{}: {nominal} {end} {trip} {comparator}", board.name);
             let operation = 1.0005 * limits.operation.value;
-            assert!(nominal < end && end <= operation && limits.operation.value < trip);
+            let is_ordered = nominal < end && end <= operation && limits.operation.value < trip;
+            assert!(is_ordered, "{}: {nominal} {end} {trip} {comparator}", board.name);
             // The tolerance is one count.
             assert!(comparator > (1.0 + COMPARATOR_ERROR - 0.002) * trip, "{}", board.name);
             let at_most = comparator * (1.0 + SENSING_ERROR);

@@ -108,7 +108,6 @@ fn a_learned_drive_holds_torque_at_rest_and_reports_a_wrong_angle() {
     session.pass(1000);
     let [_, _, flux] = session.talk.board.machine.flux();
     let torque = session.talk.board.machine.plant.torque();
-    println!("{}", session.ask("status")[0]);
     assert!(flux > 0.1 && torque > 0.5, "{flux} Wb, {torque} Nm");
     let status = session.ask("status").pop().unwrap();
     assert!(status.starts_with("regulating torque"), "{status}");
@@ -116,7 +115,6 @@ fn a_learned_drive_holds_torque_at_rest_and_reports_a_wrong_angle() {
     assert!(shown.contains("Nm"), "{status}");
     assert_eq!(session.ask("!turn 150"), ["ok"]);
     session.announced("fault ");
-    println!("{}", session.ask("faults").join("\n"));
 }
 
 #[test]
@@ -190,18 +188,15 @@ fn the_loss_of_the_saliency_is_told(seed: u64) {
     }
     // If the shaft is held at rest against a load, it slips away first.
     let (off, largest) = until_off(&mut running(seed, "speed", 0.0, "free 0.4"), 3000);
-    println!("{seed}, held at rest: {off:?} ms, {largest:.0} deg");
-    assert!(off.is_some());
+    assert!(off.is_some(), "{largest} degrees");
     // On an idle rotating shaft it is detected later, or not at all, while the angle stays right.
     let (off, largest) = until_off(&mut running(seed, "speed", 150.0, "free 0"), 10_000);
-    println!("{seed}, idle: {off:?} ms, {largest:.0} deg");
     assert!(largest < 10.0, "{off:?}, {largest}");
     // Without torque the drift of the frame (53 degrees in a minute) has no visible effect; with the first torque it is detected.
     let mut session = running(seed, "torque", 0.0, "locked");
     assert_eq!(until_off(&mut session, 5000).0, None);
     session.ask("torque 2");
     let (off, largest) = until_off(&mut session, 1000);
-    println!("{seed}, first torque: {off:?} ms, {largest:.0} deg");
     assert!(off.is_some_and(|ms| ms <= 100) && largest < 60.0, "{off:?}, {largest}");
     // Above the speed range of the injection it is not detected; it is on the way down.
     let mut session = running(seed, "speed", 1200.0, "free 0.2");
@@ -209,7 +204,6 @@ fn the_loss_of_the_saliency_is_told(seed: u64) {
     assert!(off.is_none() && largest < 15.0, "{off:?}, {largest}");
     session.ask("speed 0");
     let (off, _) = until_off(&mut session, 10_000);
-    println!("{seed}, on the way down: {off:?} ms");
     assert!(off.is_some());
     session.announced("fault 26");
 }

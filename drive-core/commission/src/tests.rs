@@ -64,7 +64,6 @@ fn the_levels_give_back_the_motor() {
         (10.8, 0.1, 1.6, 0.05, 4.0),
     ] {
         let fit = found(&levels(&Motor { r_s, leakage, r_r, tau_r, e }));
-        std::println!("{fit:?}");
         let near = |found: f32, truth: f64, within: f64, name: &str| {
             let error = f64::from(found) / truth - 1.0;
             assert!(error.abs() < within, "{name}: {found}, not {truth}: {error}");

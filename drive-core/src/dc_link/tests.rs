@@ -128,7 +128,6 @@ fn a_stop_keeps_the_link_below_the_trip() {
             let mut bench = Bench::new(settings, sign * rpm);
             bench.inertia = inertia * 0.012;
             let s = bench.stop();
-            println!("{rpm} rpm: {s:.2} s, at most {:.0} V", bench.highest);
             assert!(bench.lowest > 300.0);
             (s, bench.highest)
         };
@@ -162,7 +161,6 @@ fn the_shaft_holds_the_link_in_an_outage() {
         assert_eq!(bench.why, Limiting::None);
         bench.mains = 0.0;
         bench.run(seconds, |_| rpm);
-        println!("{rpm} rpm: {:.0} V, {:.0} rpm", bench.lowest, bench.rpm);
         assert!(bench.lowest > 206.0, "{} V", bench.lowest);
         assert!(bench.rpm.abs() > least_rpm, "{} rpm", bench.rpm);
         assert!(matches!(bench.why, Limiting::RideThrough | Limiting::DcLinkLow));
@@ -195,7 +193,6 @@ fn a_sagging_mains_carries_torque_again() {
         bench.run(0.6, |_| rpm);
         let slow = bench.rpm;
         bench.run(1.5, |_| rpm);
-        println!("{rpm} rpm: {slow:.0}, then {:.0}, {:.0} V", bench.rpm, bench.lowest);
         assert!(bench.lowest > 215.0, "{} V", bench.lowest);
         assert!(bench.rpm > slow && (bench.rpm - rpm).abs() < 50.0, "{slow}, {}", bench.rpm);
     }
@@ -226,7 +223,6 @@ fn a_resistor_takes_what_it_may() {
             assert!((0.93..1.0).contains(&ratio), "{in_it} J of {} J", bench.resistor_j);
         }
     }
-    println!("{} J, {hottest}, {:.0} V, {reasons:?}", bench.resistor_j, bench.highest);
     assert!(hottest <= 1.0 && hottest > 0.9, "{hottest}");
     assert!(bench.highest < 396.0, "{} V", bench.highest);
     assert!(reasons.contains(&Limiting::ResistorHot));

@@ -62,7 +62,6 @@ fn five_turns_without_overshoot_whatever_the_limits() {
         [(24.0, 12.0, 1.0), (24.0, 5.0, 1.0), (5.0, 5.0, 1.0), (5.0, 5.0, 1.5), (5.0, 5.0, 0.7)]
     {
         let done = run(&motion(limit, ramp), Target::Position(5.0), (9e9, 0.0), heavier, 8.0);
-        println!("{limit} turns/s, {ramp} turns/s^2, inertia x{heavier}: {done:?}");
         assert!(done.furthest < 5.0 * 1.01, "{done:?}");
         assert!(done.settled < 3.5, "{done:?}");
     }

@@ -162,7 +162,6 @@ fn delays_are_those_of_the_filters() {
         ("synchronous", delay(InTurn::default()), 19.0 + 4.5 + 1.0),
     ];
     for (name, found, expected) in found {
-        println!("{name}: {found:.2} samples, {expected:.2} expected");
         assert!((found - expected).abs() < 0.5, "{name}: {found} {expected}");
     }
 }

@@ -33,9 +33,8 @@ fn a_clean_sequence_gives_the_plant() {
     // Quantised like the current sensors of the source: 2.2 mA.
     let quantised: Vec<f64> = output(&u).iter().map(|y| (y / 0.0022).round() * 0.0022).collect();
     let found = fit(&u, &quantised, FIRST).unwrap();
-    println!("{:.1e} {:.2e}", found.a[0] + P, found.b[0] / K - 1.0);
-    assert!((found.a[0] + P).abs() < 9e-5 && (found.b[0] / K - 1.0).abs() < 1.2e-3);
-    assert!(found.rms < 0.0022);
+    let [pole, gain] = [found.a[0] + P, found.b[0] / K - 1.0];
+    assert!(pole.abs() < 9e-5 && gain.abs() < 1.2e-3 && found.rms < 0.0022, "{found:?}");
 }
 
 #[test]

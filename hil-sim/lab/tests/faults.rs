@@ -147,9 +147,7 @@ fn r4_bad_input() {
     for fault in faults {
         for (signal, speed) in Signal::ALL.into_iter().flat_map(|s| [(s, 375.0), (s, 61.0)]) {
             let result = run(signal, speed, fault, Noise::NONE);
-            println!("{fault:?} {} {speed} {result:.4?}", signal.name());
             let noisy = run(signal, speed, fault, Noise { voltage: 0.005, current: 0.02 });
-            println!("   with noise {noisy:.4?}");
             let open = matches!(fault, Fault::NoCurrent | Fault::OpenPhase);
             // Checked after 0.2 s, or, after an open phase and a reset of the covariance, after 0.5 s.
             let right = result.errors[usize::from(open)] < 0.1;

@@ -109,10 +109,9 @@ fn a_wrong_slip_has_the_peak_of_the_tracking_loop() {
     let expected = 0.3240 * wrong / (TAU * 6.0) * 360.0 / TAU;
     // The peak comes after 1/w_n = 27 ms; the current has settled by 10 ms.
     let peak = response.angle_deg[60..].iter().copied().fold(0.0, f64::max);
-    println!("peak {peak} expected {expected}");
     // The peak is higher because the 3.2 ms of the averages reduce the damping: 1.14 at this bandwidth, from a separate
     // integration of only the averages and the loop. The rise of the current causes the rest.
-    assert!((1.1..1.2).contains(&(peak / expected)));
+    assert!((1.1..1.2).contains(&(peak / expected)), "{peak} of {expected}");
 }
 
 /// After a load step the speed returns, with the current that carries the load.

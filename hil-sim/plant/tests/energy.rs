@@ -66,7 +66,6 @@ fn missing(iron: &IronSettings, steps_per_period: u32) -> (f64, f64) {
 fn no_term_makes_energy() {
     let rest: Vec<f64> = [2, 4, 8, 16].map(|steps| missing(&ALL, steps).0.abs()).into();
     let fed = missing(&ALL, 16).1;
-    println!("of {fed:.2} J missing {rest:?} J at 2, 4, 8, 16 steps a period");
     // The error is of at least first order, and almost nothing remains: less than 1e-5 of the energy.
     for pair in rest.windows(2) {
         assert!(pair[1] < 0.6 * pair[0], "{rest:?}");

@@ -91,7 +91,6 @@ fn with_the_outputs_off_a_high_emf_charges_the_link_and_a_low_one_does_not() {
         // Power into the machine, from the mean voltage of the period and the current at its end.
         charged -= 1.5 * (i.conj() * plant.applied_voltage()).re * T;
     }
-    println!("emf {emf:.1} V line to line: up to {most:.2} A, {charged:.4} J into the link");
     assert!(most > 0.05 && charged > 0.0, "{most} A, {charged} J");
     // The energy comes from the flux, so the flux and the current decay.
     for _ in 0..12_000 {

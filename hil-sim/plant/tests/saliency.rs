@@ -76,7 +76,6 @@ fn the_flux_axis_has_the_high_impedance() {
     // Small signal, current along the flux: s = a_psi + b1 0.7 A = -0.0098, and the ratio of the currents is (1 + s) to
     // (1 - s).
     let ratio = d.norm() / q.norm();
-    println!("|i_d|/|i_q| = {ratio:.5}");
     assert!(d.norm() < q.norm(), "d must have the higher impedance");
     assert!((ratio - (1.0 - 0.0098) / (1.0 + 0.0098)).abs() < 5e-4, "{ratio}");
     // If the flux part has the opposite sign, the order is reversed.

@@ -141,7 +141,6 @@ fn the_analog_filter_lags_by_6_5_degrees_at_600_hz() {
         let gain = phasor.norm() / (15.0 * f64::from(per_cycle));
         // atan(600/5305). The straight pieces have the phase of the cosine but, at ten a cycle, only sinc(1/10)^2 =
         // 0.967 of its size (their images alias back and add a little).
-        println!("{substeps} substeps: {lag:.3} degrees, gain {gain:.4}");
         let expected = (600.0f64 / 5305.0).atan().to_degrees();
         assert!((expected - 6.45).abs() < 0.01);
         let tolerance = if substeps == 1 { 0.5 } else { 0.1 };

@@ -82,7 +82,6 @@ fn with_pulses(pair: &mut Pair, switching_khz: Carrier) -> Result<()> {
             assert!(since == 0 || since.abs_diff(period) < 200, "{since} ticks");
         })?;
         let wanted = per_ampere * i_q;
-        println!("{switching_khz:?}: {sum:.4} of {wanted:.4} Nm");
         assert!((sum / wanted - 1.0).abs() < 0.05, "{switching_khz:?}: {sum} of {wanted} Nm");
     }
     compare_telemetry(pair)?;

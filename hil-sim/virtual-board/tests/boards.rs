@@ -130,7 +130,6 @@ fn torque_steps(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
             count += 1.0;
         })?;
         let (torque, wanted) = (sum / count, per_ampere * i_q);
-        println!("{}: {i_q:.2} A: {torque:.4} Nm of {wanted:.4} Nm", stage.name);
         assert!((torque / wanted - 1.0).abs() < 0.05, "{}", stage.name);
     }
     pair.order("stop")?;
@@ -152,7 +151,6 @@ fn position_step(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
     let turns = |pair: &Pair| (pair.board.plant.mechanical_angle() - from) / TAU;
     pair.run(18_000, |pair, _| largest = largest.max(turns(pair)))?;
     let end = turns(pair);
-    println!("{}: {end:.5} turns, overshoot {:.5}", stage.name, largest - 1.0);
     assert!((end - 1.0).abs() < 0.003 && largest < 1.01, "{}: {end}, {largest}", stage.name);
     pair.order("stop")?;
     pair.until_state(State::Off)?;

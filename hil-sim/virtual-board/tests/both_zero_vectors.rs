@@ -36,7 +36,6 @@ fn torque(pair: &mut Pair) -> Result<Cycles> {
             most.whole += f64::from(period.cycles) / 6000.0;
         })?;
         let (torque, wanted) = (sum / 3000.0, per_ampere * i_q);
-        println!("{i_q} A: {torque:.4} Nm of {wanted:.4} Nm");
         assert!((torque / wanted - 1.0).abs() < 0.05, "{torque} of {wanted}");
     }
     pair.order("stop")?;
@@ -72,7 +71,6 @@ fn both_zero_vectors_halve_the_variance_and_the_host_computes_the_same() -> Resu
         torque(&mut pair)?
     }];
     let two = reading(&mut pair)?;
-    println!("one {one:?} A, two {two:?} A; {cycles:#?}");
     assert!((two[0] - one[0]).abs() < 2e-4, "{one:?} {two:?}");
     assert!((two[1] / one[1] / 0.5_f64.sqrt() - 1.0).abs() < 0.03, "{one:?} {two:?}");
     // Two more readings and additions.

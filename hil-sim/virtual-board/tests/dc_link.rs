@@ -63,7 +63,6 @@ fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
         n += 1;
         assert!(n < 60_000, "still {} rpm", rpm(&pair));
     }
-    println!("{:.2} s, {highest:.1} V, duty up to {most:.2}, {burnt:.0} J", n as f64 / 6000.0);
     assert_eq!(pair.shadow.drive.state(), State::Speed);
     assert!(highest < TRIP_V - 5.0, "{highest} V");
     // The estimate does not include magnetic energy and slip.
@@ -162,7 +161,6 @@ fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
         assert!(n < 12_000, "open at {} V", pair.board.plant.dc_link());
     }
     let (v, took) = (pair.board.plant.dc_link(), f64::from(n) / 6000.0);
-    println!("closed after {took:.3} s at {v:.1} V");
     // With 200 ohm the load of 5 W costs 3.3 V; 5 V of band and 0.3 s leave 5 / (e^3.2 - 1) V more.
     assert!(v > mains - 5.0 && took > 0.3, "{v} V after {took} s");
     pair.start_torque()?;

@@ -101,7 +101,6 @@ fn the_short_carries_current() -> Result<()> {
             currents.push(script.board.plant.phase_currents()[0].abs() / loaded);
         }
         let [off, shorted] = currents[..] else { panic!("two runs") };
-        println!("{}: share of the current left: {off:.4} off, {shorted:.3} shorted", stage.name);
         assert!(off < 1e-6 && shorted > 0.2, "{}: {currents:?}", stage.name);
     }
     Ok(())
@@ -307,7 +306,6 @@ fn outside_the_window_a_shunt_shows_garbage() -> Result<()> {
         script.wait(PERIOD)?;
         let current = script.board.plant.phase_currents()[0];
         let seen = amperes(&shunts, script.results(0, 1)[0]);
-        println!("{}: {seen:.3} A of {current:.3} A with full duty", stage.name);
         assert!(current < -0.1 && seen.abs() < 0.1 * current.abs() + allowed(&shunts, 0.0));
 
         // Sampling of 640.5 clocks: a rank ends 15 us after the one before, the fourth 46 us after the top, when the
@@ -347,7 +345,6 @@ fn a_reading_settles_with_the_time_constant() -> Result<()> {
             script.wait(3 * PERIOD)?;
             let seen = amperes(&shunts, script.results(0, 1)[0]);
             let expected = currents[0] * (1.0 - (-settled_us * 1e-6 / shunts.settling_s).exp());
-            println!("{}: {settled_us} us: {seen:.3} A, expected {expected:.3}", stage.name);
             // A tick changes the reading by 1.5 %.
             let error = allowed(&shunts, expected) + 0.02 * currents[0].abs();
             assert!((seen - expected).abs() < error, "{}: {seen} A, {expected} A", stage.name);

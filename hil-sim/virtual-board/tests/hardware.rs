@@ -101,7 +101,6 @@ fn a_counter_at_a_third_of_its_top_is_reset() -> Result<()> {
         }
         let (at, cause) = *board.resets.first().context("no reset")?;
         let periods = (at - began) as f64 / TICKS_PER_PERIOD as f64;
-        println!("{cause} after {periods:.2} periods");
         let expected = matches!(cause, Reset::Window | Reset::Software);
         assert!(expected && periods < 2.0, "{cause} after {periods} periods");
         assert!(!board.chip().tim1.outputs_on());
@@ -134,9 +133,7 @@ fn a_bad_word_in_the_code_switches_off() -> Result<()> {
             board.run_ticks(20)?;
             assert!(board.chip().now < began + 130 * TICKS_PER_PERIOD, "{what}: still on");
         }
-        let ms = (board.chip().now - began) as f64 / 170e3;
         board.run_periods(400)?;
-        println!("{what} at {bad:#x}: off after {ms:.3} ms, {:?}", board.resets);
         assert_eq!(board.resets.len(), 1, "{what}");
         let log = board.take_log()?;
         let told = |line: &String| line.contains("clock or flash failure");
@@ -173,7 +170,6 @@ fn braking(capacitor_f: f64, rpm_per_s: f64) -> Result<(f64, f64, State)> {
         link_v = link_v.max(plant.dc_link());
         stress_v = stress_v.max(stage.switches.stress_v(plant.dc_link(), plant.phase_currents()));
     }
-    println!("{:.0} rpm, link {link_v:.1} V, switches {stress_v:.1} V", rpm(&pair));
     assert!(rpm(&pair) < 1300.0, "{} rpm", rpm(&pair));
     Ok((link_v, stress_v, pair.shadow.drive.state()))
 }

@@ -186,7 +186,6 @@ fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
     let flux = mean_within(&report.series("rotor_flux_wb"), from, to);
     let expected = 1.5 * f64::from(m.pole_pairs) * m.l_m / (m.l_m + m.l_lr) * flux * 1.0;
     let seen = mean_within(&torque, from, to);
-    println!("torque {seen:.3} Nm, by the equation {expected:.3} Nm, flux {flux:.3} Wb");
     assert!((seen / expected - 1.0).abs() < 0.1, "{seen} {expected}");
     // Off at both ends, without torque.
     for (series, largest) in [(&outputs, 0.0), (&torque, 0.01)] {
@@ -233,7 +232,6 @@ fn a_script_turns_a_free_shaft_and_repeats_to_the_bit() {
         expected += (pair[0].1 - friction * w) / inertia * seconds;
     }
     let end = speed[speed.len() - 1].1.to_radians() * 6.0;
-    println!("speed {end:.3} rad/s, by the torque {expected:.3} rad/s");
     // The curves are means of ten periods; the remaining error is that of the rectangle rule.
     assert!(end > 3.0 && (end / expected - 1.0).abs() < 0.02, "{end} {expected}");
 }

@@ -149,7 +149,6 @@ fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     let rpm = master.rpm();
     assert!((rpm / 150.0 - 1.0).abs() < 0.03, "{rpm} rpm");
     let page = master.read(0x2100, 13)?;
-    println!("{rpm:.2} rpm at the rotor; 0x2100: {page:?}");
     assert_eq!((page[0], page[1], page[2]), (0, RUNS | AT_SPEED, 500));
     // A single reading varies with the tracked angle.
     let mut frequency = 0.0;
@@ -283,7 +282,6 @@ fn a_master_that_was_set_up_before_needs_no_other_numbers() -> Result<()> {
     assert_eq!(master.ask(&[16, 0x20, 0, 0, 2, 4, 0, 18, 0x01, 0xf4])?, [16, 0x20, 0, 0, 2]);
     master.run(4.5)?;
     let (rpm, shown) = (master.rpm(), f64::from(master.float(0x3004)?));
-    println!("{rpm:.2} rpm at the rotor, {shown:.2} in its register");
     assert!((rpm / 150.0 - 1.0).abs() < 0.03 && (shown / rpm - 1.0).abs() < 0.03, "{rpm} {shown}");
     assert_eq!(master.float(0x3024)?, 2.0, "it runs");
     Ok(())
@@ -398,7 +396,6 @@ fn three_thousand_frames_of_noise() -> Result<()> {
         assert!(!master.outputs_on(), "{frame:x?}");
     }
     master.answered = ANSWERED_FAST;
-    println!("{answered} answered, {ignored} ignored");
     assert!(answered > 400 && ignored > 2000 && master.board.resets.is_empty());
     assert_eq!(master.read(COMMAND, 3)?, [1, 0, 0]);
     assert_eq!(master.read(0x4fff, 1)?, [0]);

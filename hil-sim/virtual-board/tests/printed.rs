@@ -26,7 +26,6 @@ fn the_printed_chains_run_on_the_board_as_on_the_host() -> Result<()> {
         ensure!(pair.shadow.drive.telemetry().delta_i != 0.0, "{demodulator:?}: no demodulation");
         pair.run(6000, |_, _| {})?;
         let (state, compared) = (pair.shadow.drive.state(), pair.shadow.compared);
-        println!("{demodulator:?}: {cycles} cycles, {state}, {compared} periods compared");
         let expected = match demodulator {
             DemodulatorKind::Literal => State::Fault(Fault::CurrentNotAsPredicted),
             _ => State::Torque,

@@ -109,20 +109,9 @@ fn torque_steps() -> Result<()> {
         let torque = [mean(b, |p| p.torque).mean(), mean(h, |p| p.torque).mean()];
         let error = [mean(b, |p| p.error_deg), mean(h, |p| p.error_deg)];
         let current = [mean(b, |p| p.iq - p.iq_ref).rms(), mean(h, |p| p.iq - p.iq_ref).rms()];
-        println!(
-            "level {n}: torque {:.4} {:.4} Nm, angle error mean {:.3} {:.3} rms {:.3} {:.3} deg, current error rms {:.2} {:.2} mA",
-            torque[0],
-            torque[1],
-            error[0].mean(),
-            error[1].mean(),
-            error[0].rms(),
-            error[1].rms(),
-            current[0] * 1e3,
-            current[1] * 1e3,
-        );
         assert!((torque[0] / torque[1] - 1.0).abs() < 0.01, "level {n}: {torque:?} Nm");
-        assert!((error[0].mean() - error[1].mean()).abs() < 0.45, "level {n}");
-        assert!((error[0].rms() - error[1].rms()).abs() < 0.3, "level {n}");
+        assert!((error[0].mean() - error[1].mean()).abs() < 0.45, "level {n}: {error:?}");
+        assert!((error[0].rms() - error[1].rms()).abs() < 0.3, "level {n}: {error:?}");
         assert!((current[0] / current[1] - 1.0).abs() < 0.1, "level {n}: {current:?} A");
     }
     Ok(())
@@ -146,9 +135,6 @@ fn position_step() -> Result<()> {
         let error = mean(&points, |p| p.error_deg).rms();
         [overshoot, settling, end, largest(|p| p.iq.abs()), largest(|p| p.rpm), error]
     });
-    println!(
-        "overshoot (turns), settling (s), end (deg), iq (A), rpm, error rms (deg): {figures:?}"
-    );
     let [b, h] = figures;
     // A thousandth of a turn; two counts of the encoder (0.036 degrees each, one from either run) at the point where
     // the position enters the last degree with 2 degrees a second; two counts; the quantisation of the currents; one

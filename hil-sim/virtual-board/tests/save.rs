@@ -13,6 +13,5 @@ fn no_operation_of_a_save_loses_both_sets() -> Result<()> {
     // first save of a minute also writes one entry to the history, because a setting of a protection was changed.
     let save = 3 + keys::COUNT as u64;
     assert_eq!(operations, [save + 1, save]);
-    println!("{operations:?} operations");
     Ok(())
 }

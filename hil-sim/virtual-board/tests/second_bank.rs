@@ -120,7 +120,6 @@ fn no_control_period_waits_for_the_flash() -> Result<()> {
     let log = board.take_log()?;
     assert!(!log.iter().any(|line| line.contains("too long")), "{log:#?}");
     // At other times the second bank is in use.
-    println!("{in_first} blocks in the first bank while busy, {in_second} in the second while not");
     assert!(in_first > 10_000 && in_second > 100 && board.resets.is_empty(), "{:?}", board.resets);
     Ok(())
 }

@@ -94,10 +94,6 @@ fn two_thousand_frames_a_second_of_eight_signals_and_a_console_that_answers() ->
     let (answer, _) = ear.ask(&mut pair, "stream off")?;
     let answer = answer.last();
     let slowest_ms = slowest as f64 / SECOND as f64 * 1e3;
-    println!(
-        "{:.0} frames/s, {missing} missing of {received}, slowest answer {slowest_ms:.1} ms; {answer}",
-        received as f64 / seconds
-    );
     ensure!(ear.damaged == 0, "{} damaged", ear.damaged);
     ensure!(received as f64 > 0.99 * 2000.0 * seconds, "{received} frames in {seconds} s");
     ensure!(f64::from(missing) < 0.01 * received as f64, "{missing} missing");
@@ -139,7 +135,6 @@ fn a_lost_link_stops_the_drive_and_brings_the_rate_back() -> Result<()> {
         }
         ensure!(passed < 1.0, "not stopped");
     };
-    println!("stopped {:.0} ms after the last sign of life", stopped * 1e3);
     ensure!(stopped < 0.5, "stopped after {stopped} s");
     pair.board.run_periods(2 * SECOND)?;
     while pair.board.next_period().is_some() {}
@@ -183,7 +178,6 @@ fn longest(stream: bool) -> Result<(u32, f64)> {
 fn a_stream_makes_the_longest_control_interrupt_no_longer() -> Result<()> {
     let (without, _) = longest(false)?;
     let (with, latest_us) = longest(true)?;
-    println!("{without} cycles without a stream, {with} with one; latest start {latest_us} us");
     ensure!(with <= without + 100, "{without} cycles without a stream, {with} with one");
     ensure!(latest_us < 1.0, "started {latest_us} us late");
     Ok(())

@@ -60,9 +60,6 @@ fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     pair.run(600, |_, _| {})?;
     let after = angle_error(&mut pair, 1200)?;
     let (used, found) = status(&mut pair)?;
-    println!(
-        "tau_r {nominal} ms, then {used} ms for {truth:.1} ms; angle error {before:.2}, then {after:.2} degrees"
-    );
     // As on the host: within 6 % at nine points, 1.4 degrees (`cargo sim run online-tracking`).
     assert!(found && (used / truth - 1.0).abs() < 0.06, "{used} ms for {truth} ms");
     assert!(before.abs() > 5.0 && after.abs() < 1.4, "{before} and {after} degrees");

@@ -163,7 +163,6 @@ fn a_learning_tells_its_progress_and_its_end() {
     }
     // The flux rotates a little slower at the beginning of every point.
     let took = rig.time() - began;
-    println!("{took} s, {expected} s were expected");
     assert!((took / expected - 1.0).abs() < 0.05, "{took} s, {expected} s were expected");
     lines.extend(talk.say(""));
     lines.sort();

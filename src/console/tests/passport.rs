@@ -87,18 +87,11 @@ fn apart(motor: &str, runs: u32) -> (usize, f64, f64) {
     });
     let largest = |end: &str| {
         let of = original.iter().filter(|(name, _)| name.ends_with(end));
-        let apart: Vec<f64> =
-            of.map(|(name, value)| (value - twin.get(name).unwrap()).abs()).collect();
-        println!("{motor} {end}: {apart:.3?}");
-        (apart.len(), apart.into_iter().fold(0.0, f64::max))
+        let apart = of.map(|(name, value)| (value - twin.get(name).unwrap()).abs());
+        apart.fold((0, 0.0_f64), |(count, most), apart| (count + 1, most.max(apart)))
     };
     let ((regions, torque), (_, error)) =
         (largest("torque_error_mean_pct"), largest("angle_error_rms_deg"));
-    println!(
-        "{motor}: {regions} regions, torque {torque:.2} %, angle {error:.3} degrees rms; lost {:?} {:?}",
-        original.get("lost_runs"),
-        twin.get("lost_runs")
-    );
     (regions, torque, error)
 }
 

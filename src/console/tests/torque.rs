@@ -47,7 +47,6 @@ fn status_tells_the_torque_that_the_motor_then_gives() {
             talk.drive.drive = rig.drive;
             let status = talk.ask("status");
             let (nm, _) = promised(&status);
-            println!("{rpm} rpm, {volts} V: {torque:.3} Nm of {nm:?}");
             // The current controllers take a part of the voltage, and the trim is not quite still.
             assert!((nm[end] - torque).abs() < 0.02 + 0.03 * torque.abs(), "{torque} Nm: {status}");
         }

@@ -139,7 +139,6 @@ fn an_open_phase_does_not_get_past_the_start() {
         drive.command(&Command::Start(Mode::Torque)).unwrap();
         assert!(!run_to(&mut drive, &mut load, State::Torque), "{name}");
         let State::Fault(fault) = drive.state() else { panic!("{name}: {}", drive.state()) };
-        println!("{name}: {fault:?}");
         let named = [
             Fault::CarrierMissingA,
             Fault::CarrierMissingB,

@@ -326,7 +326,6 @@ fn a_quick_stop_by_voltage_and_frequency_brakes_to_rest() {
     let quick = seconds(&[(9.0, Stop::Quick)]);
     let harder = seconds(&[(0.2, Stop::Ramp), (9.0, Stop::Quick)]);
     let no_softer = seconds(&[(0.1, Stop::Quick), (9.0, Stop::Ramp)]);
-    println!("{ramp:.3?} {quick:.3?} {harder:.3?} {no_softer:.3?}");
     // The ramp is 300 rpm/s; the quick stop from the rated speed in 2 s is 750 rpm/s.
     assert!((0.9..1.1).contains(&ramp.0), "{ramp:?}");
     assert!((0.3..0.55).contains(&quick.0), "{quick:?}");

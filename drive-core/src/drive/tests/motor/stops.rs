@@ -65,9 +65,6 @@ fn a_stop_by_ramp_brings_the_shaft_to_rest_from_every_mode() {
                 most = most.max(bench.motor.rpm());
                 bench.drive.state() == State::Stopping
             });
-            println!(
-                "{source:?} {mode:?} {stop:?}: jump {jump:.2} A, error {error:.1}, over {most:.1} rpm"
-            );
             assert!(stopped, "{source:?} {mode:?} {stop:?}: {}", bench.drive.state());
             assert!(bench.motor.rpm().abs() < 15.0 && most < 40.0, "{} {most}", bench.motor.rpm());
             assert!(bench.run_to(State::Off));
