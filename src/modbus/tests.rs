@@ -128,44 +128,14 @@ fn a_busy_slave_answers_whole_requests_for_it_alone() {
 
 #[test]
 fn frames_of_the_specification() {
-    // Examples of the application protocol V1.1b3, 6.3, 6.6, 6.8, 6.12, with other addresses.
-    for (request, answer) in [
-        (&[17, 3, 0x20, 0x01, 0, 2][..], &[17, 3, 4, 0, 3, 0, 6][..]),
-        (&[17, 6, 0x20, 0x02, 0xab, 0xcd], &[17, 6, 0x20, 0x02, 0xab, 0xcd]),
-        (&[17, 16, 0x20, 0x01, 0, 2, 4, 0, 10, 1, 2], &[17, 16, 0x20, 0x01, 0, 2]),
-        (&[17, 8, 0, 0, 0xa5, 0x37], &[17, 8, 0, 0, 0xa5, 0x37]),
-        // 6.4 and 6.17: input registers are the same registers; the read sees what was written.
-        (&[17, 4, 0x20, 0x01, 0, 2], &[17, 4, 4, 0, 3, 0, 6]),
-        (&[17, 23, 0x20, 3, 0, 2, 0x20, 4, 0, 1, 2, 0xab, 0xcd], &[17, 23, 4, 0, 9, 0xab, 0xcd]),
-        // Illegal function: coils, another subfunction, a user-defined function.
-        (&[17, 1, 0x20, 0, 0, 1], &[17, 0x81, 1]),
-        (&[17, 5, 0x20, 0, 1, 2], &[17, 0x85, 1]),
-        (&[17, 8, 0, 1, 0, 0], &[17, 0x88, 1]),
-        (&[17, 0x41], &[17, 0xc1, 1]),
-        // Illegal address: outside, and a block that exceeds the registers or the 16 bits.
-        (&[17, 3, 0, 0, 0, 1], &[17, 0x83, 2]),
-        (&[17, 3, 0x20, 0xff, 0, 2], &[17, 0x83, 2]),
-        (&[17, 3, 0xff, 0xff, 0, 2], &[17, 0x83, 2]),
-        (&[17, 6, 0x30, 0, 0, 0], &[17, 0x86, 2]),
-        // Illegal value: none or too many registers, byte counts and lengths that do not fit.
-        (&[17, 3, 0x20, 0, 0, 0], &[17, 0x83, 3]),
-        (&[17, 3, 0x20, 0, 0, 126], &[17, 0x83, 3]),
-        (&[17, 3, 0x20, 0, 0], &[17, 0x83, 3]),
-        (&[17, 6, 0x20, 0, 0, 1, 0], &[17, 0x86, 3]),
-        (&[17, 16, 0x20, 0, 0, 2, 2, 0, 1], &[17, 0x90, 3]),
-        (&[17, 16, 0x20, 0, 0, 1, 3, 0, 1, 2], &[17, 0x90, 3]),
-        (&[17, 16, 0x20, 0, 0, 0, 0], &[17, 0x90, 3]),
-        (&[17, 16, 0x20, 0, 0, 2, 4, 0, 1], &[17, 0x90, 3]),
-        (&[17, 4, 0x20, 0, 0, 0], &[17, 0x84, 3]),
-        (&[17, 23, 0x20, 0, 0, 0, 0x20, 0, 0, 1, 2, 0, 1], &[17, 0x97, 3]),
-        (&[17, 23, 0x20, 0, 0, 1, 0x20, 0, 0, 2, 2, 0, 1], &[17, 0x97, 3]),
-        (&[17, 23, 0x20, 0, 0, 1, 0x20, 0, 0], &[17, 0x97, 3]),
-        (&[17, 23, 0x30, 0, 0, 1, 0x20, 0, 0, 1, 2, 0, 1], &[17, 0x97, 2]),
-        // The slave cannot carry it out.
-        (&[17, 6, 0x20, 0xff, 0, 0], &[17, 0x86, 4]),
-    ] {
-        let answered = ask(&framed(request), &mut memory());
-        assert_eq!(answered.as_deref(), Some(answer), "{request:x?}");
+    let bytes = |text: &str| -> Vec<u8> {
+        text.split(' ').map(|byte| u8::from_str_radix(byte, 16).expect(text)).collect()
+    };
+    let lines = include_str!("tests/frames.txt").lines();
+    for line in lines.filter(|line| !line.is_empty() && !line.starts_with('#')) {
+        let (request, answer) = line.split_once(" => ").expect(line);
+        let answered = ask(&framed(&bytes(request)), &mut memory());
+        assert_eq!(answered, Some(bytes(answer)), "{line}");
     }
     let mut written = memory();
     ask(&framed(&[17, 16, 0x20, 0x01, 0, 2, 4, 0, 10, 1, 2]), &mut written);
