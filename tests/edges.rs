@@ -360,12 +360,10 @@ fn a_stop_during_a_design_cancels_the_start() {
             "late" => stand.send(&stop),
             _ => stand.terminals.closed = Contacts(0),
         }
-        let starts = stand.drive.commands.len();
         for _ in 0..300 {
             stand.wait(1);
             assert!(stand.rig.drive.is_off(), "{from}, {way}: {:?}", stand.state());
         }
-        let _ = starts;
         assert!(!stand.front.desk.is_busy());
     }
 }
