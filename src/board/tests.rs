@@ -134,3 +134,15 @@ fn references_agree_within_three_per_cent() {
     assert!(!references_agree(0, 1655) && !references_agree(1504, u16::MAX));
     assert!(!references_agree(1504, 0));
 }
+
+/// Only nSWBOOT0 = 0 with nBOOT0 = 1 ends that the boot pin counts, whatever the other option bytes are.
+#[test]
+fn the_boot_pin_counts_unless_both_bits_say_otherwise() {
+    for others in [0, !(N_SWBOOT0 | N_BOOT0)] {
+        for (bits, counts) in
+            [(0, true), (N_SWBOOT0, true), (N_SWBOOT0 | N_BOOT0, true), (N_BOOT0, false)]
+        {
+            assert_eq!(boot_pin_counts(others | bits), counts, "{others:#x} {bits:#x}");
+        }
+    }
+}

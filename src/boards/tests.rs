@@ -4,7 +4,9 @@ use std::fmt::Write;
 
 use super::{
     ALL, Board, COMPARATOR_ERROR, Currents, Level, OF_SWITCHES, SENSING_ERROR, Source, check,
+    identity::Identity,
     morpho, pin,
+    pin::{Pin, Port},
 };
 use crate::board::{protection, settings_of};
 use crate::generated;
@@ -208,8 +210,29 @@ fn a_board_that_cannot_be_protected_does_not_compile() {
             check(&other);
         }
     }
+    let mut other = *ALL[0];
+    other.terminals.pins[0] = other.terminals.pins[1];
+    assert!(refused(other).contains("a terminal has the pin of another signal"));
     // As this board was once: its link up to the absolute maximum of its transistors.
     let mut old = *ALL[1];
     (old.dc_link_v, old.dc_link_limits.operation.value) = (48.0, 58.5);
     assert!(refused(old).contains("limits of switches and capacitors"));
+}
+
+/// A gate or the fault input at another pin, of another port or number, makes another identity.
+#[test]
+fn each_pin_is_part_of_the_identity() {
+    let pins = |board: &Board| Identity::of(board).pins;
+    let moves: [fn(&mut Board) -> &mut Pin; 3] = [
+        |board| &mut board.high.pins[0],
+        |board| &mut board.low.pins[2],
+        |board| &mut board.fault.pin,
+    ];
+    for pin in moves {
+        let (mut number, mut port) = (*ALL[0], *ALL[0]);
+        pin(&mut number).number ^= 1;
+        let of = pin(&mut port);
+        of.port = if of.port == Port::A { Port::B } else { Port::A };
+        assert!(pins(&number) != pins(ALL[0]) && pins(&port) != pins(ALL[0]));
+    }
 }
