@@ -64,6 +64,8 @@ pub struct Coefficients<L = DefaultLoop> {
     pub estimator: Estimator<L>,
     /// The back-EMF observer, if the angle does not come from the injection alone.
     pub observer: Option<Observer>,
+    /// Stator frequency above which the observer gives the angle, electrical turns per period.
+    pub observer_leads: f32,
     /// The watch on the noise of the sensors, if the angle comes from the injection.
     pub noise_watch: Option<NoiseWatch>,
     /// The injection.

@@ -68,7 +68,7 @@ impl<L: AngleLoop> Coefficients<L> {
     /// Decides which source gives the angle.
     pub(super) fn hand_over(&self, s: &mut Field<L::State>, step: &StepResults) {
         if self.observer.is_some() && step.trust.observes() {
-            s.hand_over.update(step.flux_freq, step.trust.source);
+            s.hand_over.update(step.flux_freq, step.trust.source, self.observer_leads);
         }
     }
 

@@ -77,7 +77,10 @@ impl<L: AngleLoop> Coefficients<L> {
         if lead != s.lead {
             (s.lead, s.lead_axis) = (lead, lead.unit_vector());
         }
-        k.references.current.q = next.i_q;
+        if core::mem::replace(&mut k.references.current.q, next.i_q) != next.i_q {
+            // The voltage that the flux did not explain belongs to the point before.
+            s.prediction.forget_mean();
+        }
         Ok(next.i_q)
     }
 

@@ -1,10 +1,11 @@
 //! Hand-over of the angle between two sources: at low stator frequency the [filter](super::angle_filter) gives the angle, at
 //! high stator frequency the [back-EMF observer](super::observer).
 //!
-//! The observer leads (gives the angle) from above 16 Hz until below 12 Hz. The sources are not blended, because a blend would show
-//! the filter a speed that is partly its own. Angles do not jump at a switch, and nothing has to be preset. The injection is switched
-//! off above 26 Hz and on below 24 Hz, so that it still shows the stator resistance to the observer. The averages of the demodulation
-//! fill in eight injection periods, during which the observer leads.
+//! The observer leads (gives the angle) from above a frequency that the settings derive from the motor, 16 Hz for most motors, until
+//! below 4 Hz less. The sources are not blended, because a blend would show the filter a speed that is partly its own. Angles do not
+//! jump at a switch, and nothing has to be preset. The injection is switched off 10 Hz above that frequency and on 8 Hz above it, so
+//! that it still shows the stator resistance to the observer. The averages of the demodulation fill in eight injection periods, during
+//! which the observer leads.
 //!
 //! For three periods after the injection was switched on or off, the current of a sample does not belong to the voltages before
 //! it. In these periods the flux rotates as in the last injection period. (Otherwise the angle jumped by 4 degrees.)
@@ -15,12 +16,12 @@
 use crate::PERIOD_S;
 use crate::carrier::CARRIER_SAMPLES;
 
-/// Stator frequencies above which the observer leads, and below which the injection leads, turns per period.
-const OBSERVER_LEADS: f32 = 16.0 * PERIOD_S;
-const INJECTION_LEADS: f32 = 12.0 * PERIOD_S;
-/// Stator frequencies above which the injection is switched off, and below which it is switched on, turns per period.
-const CARRIER_OFF: f32 = 26.0 * PERIOD_S;
-const CARRIER_ON: f32 = 24.0 * PERIOD_S;
+/// Distance of the frequency below which the injection leads from the one above which the observer leads, turns per period.
+const INJECTION_LEADS: f32 = 4.0 * PERIOD_S;
+/// Distance from the frequency above which the observer leads to those above which the injection is switched off, and below which it
+/// is switched on, turns per period.
+const CARRIER_OFF: f32 = 10.0 * PERIOD_S;
+const CARRIER_ON: f32 = 8.0 * PERIOD_S;
 /// Periods after the injection was switched in which voltage and current of the observer do not belong together.
 const BLIND: u8 = 3;
 /// Injection periods until the averages of the demodulation are filled.
@@ -85,12 +86,12 @@ pub struct Turning {
 }
 
 impl HandOver {
-    /// Updates the leading source and the injection by the stator frequency `flux_freq`, electrical turns per period, for a frame
-    /// that this `source` may rotate; called once an injection period.
-    pub fn update(&mut self, flux_freq: f32, source: Source) {
+    /// Updates the leading source and the injection by the stator frequency `flux_freq`, for a frame that this `source` may rotate;
+    /// called once an injection period. The observer leads above `leads`. Both frequencies are in electrical turns per period.
+    pub fn update(&mut self, flux_freq: f32, source: Source, leads: f32) {
         let freq = flux_freq.abs();
-        self.is_fast = freq > if self.is_fast { INJECTION_LEADS } else { OBSERVER_LEADS };
-        let goes_on = if self.is_carrier_off() { CARRIER_ON } else { CARRIER_OFF };
+        self.is_fast = freq > if self.is_fast { leads - INJECTION_LEADS } else { leads };
+        let goes_on = leads + if self.is_carrier_off() { CARRIER_ON } else { CARRIER_OFF };
         self.switch(match self.carrier {
             _ if source == Source::Nothing || freq > goes_on => CarrierState::Off,
             CarrierState::Off => CarrierState::Filling(FILLED - 1),
@@ -113,11 +114,10 @@ impl HandOver {
     }
 
     fn switch(&mut self, carrier: CarrierState) {
-        let was_off = self.is_carrier_off();
-        self.carrier = carrier;
-        if self.is_carrier_off() != was_off {
+        if self.is_carrier_off() != (carrier == CarrierState::Off) {
             self.blind = BLIND + 1;
         }
+        self.carrier = carrier;
     }
 
     /// Whether the injection is off.
@@ -173,6 +173,9 @@ impl HandOver {
 mod tests {
     use super::*;
 
+    /// Frequency above which the observer leads in the tests, turns per period.
+    const LEADS: f32 = 16.0 * PERIOD_S;
+
     /// The observer is blind for three periods after the injection was switched off or on, and not in between,
     /// whichever source leads.
     #[test]
@@ -180,7 +183,7 @@ mod tests {
         let mut state = HandOver::default();
         let mut blind = [0; 4];
         for (k, hertz) in [17.0, 25.0, 27.0, 23.0].into_iter().enumerate() {
-            state.update(hertz * PERIOD_S, Source::Both);
+            state.update(hertz * PERIOD_S, Source::Both, LEADS);
             blind[k] = (0..20).filter(|_| state.advance_blanking()).count();
             assert!(!state.advance_blanking());
         }
@@ -205,7 +208,7 @@ mod tests {
             for tenth in (0..=300).chain((0..300).rev()) {
                 let (led, was_off) = (state.leads, state.is_carrier_off());
                 for _ in 0..20 {
-                    state.update(sign * (tenth as f32 - 0.5) * (0.1 * PERIOD_S), source);
+                    state.update(sign * (tenth as f32 - 0.5) * (0.1 * PERIOD_S), source, LEADS);
                 }
                 for (n, changed) in [
                     state.leads && !led,
@@ -223,14 +226,14 @@ mod tests {
             assert_eq!(state.is_carrier_off(), source == Source::Nothing);
         }
         let mut state = HandOver::default();
-        state.update(27.0 * PERIOD_S, Source::Both);
+        state.update(27.0 * PERIOD_S, Source::Both, LEADS);
         let filling = (0..20).take_while(|_| {
-            state.update(0.0, Source::Both);
+            state.update(0.0, Source::Both, LEADS);
             assert_eq!(state.demodulates(), !state.leads);
             state.leads
         });
         assert_eq!(filling.count(), usize::from(FILLED) - 1);
-        state.update(20.0 * PERIOD_S, Source::Both);
+        state.update(20.0 * PERIOD_S, Source::Both, LEADS);
         assert!(state.leads);
         state.switch_carrier_off();
         assert!(state.is_carrier_off() && !state.leads);
@@ -257,7 +260,7 @@ mod tests {
     fn noise_is_judged_some_time_after_the_observer_has_left() {
         let mut state = HandOver::default();
         let judged = |state: &mut HandOver, hertz: f32| {
-            state.update(hertz * PERIOD_S, Source::Both);
+            state.update(hertz * PERIOD_S, Source::Both, LEADS);
             state.judges_noise()
         };
         for _ in 0..3 {

@@ -367,4 +367,16 @@ mod tests {
         }
         assert!(poles.iter().all(|n| *n > 5), "{poles:?}");
     }
+
+    /// Two motors of 87 and 276 Hz. At the points of most torque the cross-saturation turns the flux of the first one, and the next point
+    /// was judged by the voltage from there. The second one slips by 16 Hz at its limit, and was led by the observer while it stood.
+    #[test]
+    fn a_motor_with_much_slip_learns_and_keeps_its_angle() {
+        for number in [257, 266] {
+            let (seed, mut record) = (seed_of(64001, number), Record::default());
+            let refused = qualify(&mut drawn(seed), seed, &mut record).unwrap();
+            assert!(refused.is_none(), "{number}: {refused:?}");
+            assert!(record.is_good(), "{number}: {}", record.rms());
+        }
+    }
 }

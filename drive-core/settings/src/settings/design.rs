@@ -185,6 +185,7 @@ impl Settings {
                 i_q: current_limit,
             },
             observer: self.uses_observer().then(|| Observer::new(m, &leakage, i_d, current_lag)),
+            observer_leads: self.observer_leads_hz() * PERIOD_S,
             sequence: SequenceSteps {
                 precharge: periods(self.sequence.precharge_s),
                 magnetise: periods(self.magnetise_s()),

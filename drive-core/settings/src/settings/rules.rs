@@ -63,6 +63,10 @@ const LIMIT_OF_TRIP: f32 = 0.76;
 /// Time in which the rated torque accelerates the assumed inertia to the rated speed, s. Rotors of 0.2 to 20 kW alone take 0.1 to
 /// 0.2 s. With the inertia of a load besides, the speed loop is slower than it could be, but stable.
 const ASSUMED_RUN_UP_S: f32 = 0.15;
+/// Smallest and largest stator frequency above which the observer gives the angle, Hz, and that frequency per slip at the current
+/// limit. Beyond the slip, 0.3 of it are left for a shaft that turns slowly.
+const OBSERVER_LEADS_HZ: (f32, f32) = (16.0, 40.0);
+const OBSERVER_LEADS_OF_SLIP: f32 = 1.3;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
 pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Injection frequency, Hz.
@@ -153,6 +157,16 @@ impl Settings {
     /// Whether the back-EMF observer takes over from the injection at speed.
     pub(crate) fn uses_observer(&self) -> bool {
         self.tracks_synchronously() && self.observer.enabled
+    }
+
+    /// Returns the stator frequency above which the back-EMF observer gives the angle, Hz: at least 16 Hz, and above the slip at the
+    /// current limit, so that a shaft that stands is left to the injection under any torque. Up to 40 Hz the sixth harmonic of the
+    /// dead time stays below half of the injection frequency until the injection is switched off.
+    pub(crate) fn observer_leads_hz(&self) -> f32 {
+        let (i_d, limit) = (self.i_d(), self.current_limit_a());
+        let i_q = libm::sqrtf((limit * limit - i_d * i_d).max(0.0));
+        let slip_hz = i_q / (TAU * self.motor.tau_r() * i_d);
+        (OBSERVER_LEADS_OF_SLIP * slip_hz).clamp(OBSERVER_LEADS_HZ.0, OBSERVER_LEADS_HZ.1)
     }
 }
 
@@ -383,6 +397,16 @@ mod tests {
             near(value, expected);
         }
         near(s.magnetise_s(), 5.0 * 0.186_09);
+    }
+
+    /// The slip at the limit of the dissertation's motor is 4.2 Hz. A twelfth of its rotor time constant gives 50 Hz.
+    #[test]
+    fn the_observer_leads_above_the_slip_at_the_limit() {
+        let mut s = Settings::default();
+        for (share, expected) in [(1.0, 16.0), (0.25, 21.8), (0.2, 27.23), (1.0 / 12.0, 40.0)] {
+            s.motor.r_r = Settings::default().motor.r_r / share;
+            near(s.observer_leads_hz(), expected);
+        }
     }
 
     /// For a motor of twice the voltage and half the current, and for a motor of the same voltage and twice the
