@@ -57,7 +57,7 @@ pub struct Printed {
     /// Unit as printed; may be empty.
     pub unit: &'static str,
     /// The value with its digits.
-    pub value: &'static str,
+    pub value: String,
     /// Its role in the source.
     pub kind: Kind,
     /// Formula by which it follows from other printed values.
@@ -120,7 +120,7 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
                 let [place, quantity, unit, value, kind, more @ ..] = &row[..] else {
                     panic!("{chapter}: too few cells in {}", row.join(", "));
                 };
-                let place = place.clone();
+                let (place, value) = (place.clone(), value.clone());
                 let (kind, name) = kind.split_once(' ').unwrap_or((kind, ""));
                 let kind = toml::Value::from(kind).try_into();
                 let kind = kind.expect("input, result, graph, claim or bench");
@@ -134,7 +134,8 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
                 for row in rows {
                     let head = format!("{place}, {}", row[0]);
                     for (column, value) in columns.iter().zip(&row[1..]) {
-                        let (place, quantity, unit) = (head.clone(), &column[0], &column[1]);
+                        let (quantity, unit) = (&column[0], &column[1]);
+                        let (place, value) = (head.clone(), value.clone());
                         let of_row = |text: &String| text.replace("{| ", &format!("{{{head} | "));
                         let formula = column.get(2).map(of_row);
                         all.push(Printed { place, quantity, unit, value, kind, formula, ..here() });
@@ -231,7 +232,7 @@ pub fn column(source: &str, table: &str, quantity: &str) -> Vec<f64> {
 impl Printed {
     /// Returns the value as a number: 1 and 0 for `yes` and `no`; fractions are divided.
     pub fn number(&self) -> Option<f64> {
-        match self.value {
+        match &*self.value {
             "yes" => Some(1.0),
             "no" => Some(0.0),
             value => value.parse().ok().or_else(|| formula::evaluate(value, &|_| None)),
@@ -268,7 +269,7 @@ impl Printed {
 
     /// Returns one unit of the last printed digit. For a whole number it is 1, regardless of trailing zeros.
     fn last_digit(&self) -> f64 {
-        let (digits, exponent) = self.value.split_once('e').unwrap_or((self.value, "0"));
+        let (digits, exponent) = self.value.split_once('e').unwrap_or((&self.value, "0"));
         let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
         10f64.powi(exponent.parse::<i32>().unwrap_or(0) - decimals as i32)
     }

@@ -292,7 +292,7 @@ impl Evidence {
         let differences = both.map(|value| 100.0 * (value / number - 1.0));
         let difference = differences.max_by(|a, b| a.abs().total_cmp(&b.abs()));
         let difference = difference.filter(|d| is_number && d.is_finite());
-        let text = || printed.value.to_owned();
+        let text = || printed.value.clone();
         let value = printed.number().filter(|_| is_number);
         let value =
             value.map_or_else(|| text().into(), |value| Cell::Number { value, text: text() });
