@@ -767,7 +767,7 @@ def picture_q():
 
 def picture_sensitivity():
     p = Picture("theory-sensitivity", "Saliency sensitivity over the q-axis current, for a lasting and for a fast error")
-    v = p.panel((0, 3), (-0.26, 0.02), [0, 0.5, 1, 1.5, 2, 2.5, 3], [-0.25, -0.2, -0.15, -0.1, -0.05, 0], "q-axis current (A)", "k = dq/de (1/rad)", 230)
+    v = p.panel((0, 3), (-0.26, 0.02), [0, 0.5, 1, 1.5, 2, 2.5, 3], [-0.25, -0.2, -0.15, -0.1, -0.05, 0], "q-axis current (A)", "k = dq/de (1/rad)", 230, left=80)
     xs = span(0, 3, 120)
     v.curve([(x, slope(q_slow, x)) for x in xs], BLUE, width=2.6)
     v.curve([(x, slope(q_fast, x)) for x in xs], ORANGE)
@@ -1495,14 +1495,14 @@ def quotes():
             f"The second value is {-100 * 0.07 / slope(q_slow, 1.5) - 100:.1f} % larger in magnitude than the {cell(slope(q_slow, 1.5), 4)} /rad of (T22)",
             f"for example +{fast_zero_slope(1.5):.3f} /rad at 1.5 A",
             f"This is +{flux_gone(0.5):.2f} % at 0.5 A and +{flux_gone(1.0):.2f} % at 1 to 3 A",
-            f"the blue curve ends {flux_gone(2.0) / 100:.4f} above q_ref",
+            f"the curve ends {flux_gone(2.0):.2f} % above q_ref",
             f"gives {100 * min(map(first_order_barrier, OFFSET_CURRENTS[1:])):.0f} to {100 * max(map(first_order_barrier, OFFSET_CURRENTS[1:])):.0f} % less",
-            f"At the barrier at 2 A this requires an asymmetry that is {100 * exact_share(2.0):.0f} % larger than by (T26)",
+            f"At the barrier at 2 A it asks for {100 * exact_share(2.0):.0f} % more than (T26)",
             f"is {barrier(3.0)[0] / mismatch(0.01) / 1.5:.2f} % or {barrier(3.0)[0] / mismatch(0.01) / 0.5:.2f} %, depending",
             f"The deficit at the barrier is {min(deficit(x, barrier(x)[1]) for x in OFFSET_CURRENTS[1:]):.2f} to "
             f"{max(deficit(x, barrier(x)[1]) for x in OFFSET_CURRENTS[1:]):.2f}",
-            f"|n| exceeds {1 - constant(SETTINGS, 'allowed_deficit'):.2f} |a| = {100 * n['silent_n'] + 1e-9:.2f} %. This requires a mismatch of "
-            f"{n['silent_n'] / mismatch(1.0) * 100:.1f} %; exactly, it is {100 * never_trips(2.0):.1f} % at 2 A",
+            f"|n| exceeds {1 - constant(SETTINGS, 'allowed_deficit'):.2f} |a| = {100 * n['silent_n'] + 1e-9:.2f} %. This takes a mismatch of "
+            f"{n['silent_n'] / mismatch(1.0) * 100:.1f} %; in full it takes {100 * never_trips(2.0):.1f} % at 2 A",
             f"hence {n['mismatch_1']:.2f} % for g = 1 %",
             f"At 3 A a mismatch of {barrier(3.0)[0] / mismatch(0.01):.2f} % that the drive does not know is enough",
             f"an asymmetry of {100 * abs(restoring(2.0, fixed_frame(2.0, -150)[2])):.2f} % holds the frame",
@@ -1545,8 +1545,8 @@ def quotes():
             f"a load step of {100 * constant(ESTIMATOR, 'LOAD_STEP'):.0f} % of the rated torque",
             f"{constant(FILTER, 'SPEED_NOISE'):.0f} (rad/s)²",
             f"{constant(FILTER, 'SLOW')} rad/s, τ_b = {Filter(1.0, 0.0).slow_s:.1f} s",
-            f"| τ_s | time with which r decays to the measured resistance | {constant(OBSERVER, 'RESISTANCE_S'):.0f} s |",
-            f"its default of {constant(SETTINGS, 'bandwidth_hz')} Hz gives ω_n = 2π · {constant(SETTINGS, 'bandwidth_hz')} Hz",
+            f"| τ_s | decay to the measured resistance | {constant(OBSERVER, 'RESISTANCE_S'):.0f} s |",
+            f"`injection.bandwidth_hz` sets ω_n = 2π · {constant(SETTINGS, 'bandwidth_hz')} Hz",
             f"Well above 1/τ_r = {M.alpha:.1f} /s",
             f"a phase margin of at least {math.floor(low)}° and a gain margin of at least {math.floor(10 * min(x[4] for x in margins_of_the_table())) / 10}",
             f"up to {slope(q_fast, 3.0) / slope(q_slow, 3.0):.1f} times the lasting one",
