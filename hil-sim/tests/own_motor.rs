@@ -178,7 +178,10 @@ fn the_first_hour_states_what_its_commands_show() {
     let (steps, speeds) = (run("torque-steps", &[]), run("speed-profile", &[]));
     let torque = |n: usize| steps["steps"][n]["torque_nm"].as_f64().expect("a torque");
     for part in [
-        format!("at most {:.1} % apart", apart.into_iter().fold(0.0, f64::max)),
+        format!(
+            "differ from the true ones by at most {:.1} %",
+            apart.into_iter().fold(0.0, f64::max)
+        ),
         format!("takes another {:.0} s", number(&found, "learning_seconds_max")),
         format!("`good_after {}`", number(&found, "good_after")),
         format!("five levels from {:.1} to {:.1} Nm", torque(0), torque(4)),
