@@ -30,7 +30,7 @@ pub enum Fault {
 const SET_UP: [&str; 4] = [
     "angle encoder",
     "set strip.enable yes strip.start switch strip.reverse yes strip.reset yes strip.presets yes strip.outputs yes motor.sensor pt1000",
-    "set strip.reference 4-20ma strip.reference_rpm 600 speed.ramp_rpm_per_s 1000 bus.commands strip",
+    "set strip.reference 4-20ma strip.reference_rpm 600 speed.ramp_rpm_per_s 1000 bus.commands strip motor.inertia 0.012",
     "apply",
 ];
 /// Reference signal at the beginning, mA: 300 rpm.
