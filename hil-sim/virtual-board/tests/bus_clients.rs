@@ -15,8 +15,8 @@ use crate::common::program::{command, folder};
 /// Commanded frequency: 5 Hz, 150 rpm with two pole pairs; and the tolerance of the speed, rpm, that a sensorless drive reaches.
 const HUNDREDTHS: &str = "500";
 const RPM: (f64, f64) = (150.0, 8.0);
-/// Time to magnetise and to run up.
-const RUN_UP: Duration = Duration::from_millis(4500);
+/// Time to magnetise, to run up and to settle, also on a machine on which the board takes twice its time.
+const RUN_UP: Duration = Duration::from_millis(8000);
 /// The longest wait for a line of the board.
 const PATIENCE: Duration = Duration::from_secs(60);
 
