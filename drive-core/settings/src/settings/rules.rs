@@ -72,6 +72,11 @@ pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Injection frequency, Hz.
 pub const CARRIER_HZ: f32 = 600.0;
 
+/// Returns the q-axis current, A, that a current limit, A, leaves beside the d-axis current `i_d`, A.
+fn remaining_a(i_d: f32, limit_a: f32) -> f32 {
+    libm::sqrtf((limit_a * limit_a - i_d * i_d).max(0.0))
+}
+
 /// Quantities to which the rules are proportional.
 impl Settings {
     /// Returns the rated current, A peak.
@@ -163,9 +168,8 @@ impl Settings {
     /// current limit, so that a shaft that stands is left to the injection under any torque. Up to 40 Hz the sixth harmonic of the
     /// dead time stays below half of the injection frequency until the injection is switched off.
     pub(crate) fn observer_leads_hz(&self) -> f32 {
-        let (i_d, limit) = (self.i_d(), self.current_limit_a());
-        let i_q = libm::sqrtf((limit * limit - i_d * i_d).max(0.0));
-        let slip_hz = i_q / (TAU * self.motor.tau_r() * i_d);
+        let i_d = self.i_d();
+        let slip_hz = remaining_a(i_d, self.current_limit_a()) / (TAU * self.motor.tau_r() * i_d);
         (OBSERVER_LEADS_OF_SLIP * slip_hz).clamp(OBSERVER_LEADS_HZ.0, OBSERVER_LEADS_HZ.1)
     }
 }
@@ -249,7 +253,7 @@ impl Settings {
     /// Returns the torque at rest, % of the rated torque, for a d-axis current, A, and the q-axis current that a current limit, A,
     /// leaves.
     pub fn torque_pct(&self, i_d: f32, limit_a: f32) -> f32 {
-        let i_q = libm::sqrtf((limit_a * limit_a - i_d * i_d).max(0.0));
+        let i_q = remaining_a(i_d, limit_a);
         100.0 * self.motor.torque_per_ampere(i_d) * i_q / self.nameplate.torque_nm()
     }
 
