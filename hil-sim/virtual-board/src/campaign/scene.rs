@@ -66,6 +66,8 @@ pub struct Target {
     pub relative_voltage: f64,
     /// Speed of [`Source::Encoder`], rpm on four poles.
     pub encoder_rpm: f64,
+    /// Inertia of the motor, kg m^2.
+    pub inertia: f64,
 }
 
 impl Target {
@@ -83,6 +85,7 @@ impl Target {
             relative_current: config.amperes(1.0),
             relative_voltage: config.inverter.dc_link_v / Config::default().inverter.dc_link_v,
             encoder_rpm,
+            inertia: config.motor.inertia,
         })
     }
 }

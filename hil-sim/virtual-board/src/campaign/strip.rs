@@ -30,7 +30,7 @@ pub enum Fault {
 const SET_UP: [&str; 4] = [
     "angle encoder",
     "set strip.enable yes strip.start switch strip.reverse yes strip.reset yes strip.presets yes strip.outputs yes motor.sensor pt1000",
-    "set strip.reference 4-20ma strip.reference_rpm 600 speed.ramp_rpm_per_s 1000 bus.commands strip motor.inertia 0.012",
+    "set strip.reference 4-20ma strip.reference_rpm 600 speed.ramp_rpm_per_s 1000 bus.commands strip",
     "apply",
 ];
 /// Reference signal at the beginning, mA: 300 rpm.
@@ -56,12 +56,13 @@ impl Scene {
     fn strip(&mut self, turns: bool) -> Result<()> {
         if self.strip.is_none() {
             self.off(0)?;
+            let inertia = format!("set motor.inertia {}", self.target.inertia);
             let board = &mut self.board;
             board.plant.set_load(Load::Free { torque: 0.0 })?;
             board.set_reference([HALF_MA; 2]);
             board.set_analog(SENSOR, WARM);
             board.set_contact("ENABLE", true)?;
-            for line in SET_UP {
+            for line in [inertia.as_str()].into_iter().chain(SET_UP) {
                 board.type_line(line);
                 wait(board, 300)?;
             }
