@@ -12,7 +12,7 @@ use crate::run::{self, TARGET};
 use crate::toolchain::{self, Target};
 
 /// The programs on `embassy-stm32`.
-const EMBASSY: &str = "hil-sim/virtual-board/foreign";
+const EMBASSY: &str = "hil-sim/virtual-board/tests/foreign";
 /// Examples of the HAL that need no log, and those that need one.
 const PLAIN: &[&str] = &["blinky", "clockout", "comp", "comp_w_dac", "dac", "opamp", "pwm"];
 const LOGGED: &[&str] = &["adc-one-shot", "independent_watchdog"];
