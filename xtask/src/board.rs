@@ -43,17 +43,19 @@ pub fn check() -> Result<()> {
 pub fn cycles(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let budget::Cycles { to_last_compare, whole } = budget::read()?.cycles;
-    let mut command = program("cycles", elf);
-    command.args([to_last_compare.to_string(), whole.to_string()]);
-    run::step("cycles of the control interrupt", &mut command)
+    let mut test = ignored_test("the_control_interrupt_keeps");
+    test.env(ELF, elf)
+        .env("TO_LAST_COMPARE", to_last_compare.to_string())
+        .env("WHOLE", whole.to_string());
+    run::step("cycles of the control interrupt", &mut test)
 }
 
 /// Injects faults into this image; fails if the outputs stay on with wrong control beyond a limit.
 pub fn campaign(elf: &Path, board: &str, faults: &Faults) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let Faults { count, seed, class, rpm } = faults;
-    let mut command = program("campaign", elf);
-    command.args([&count.to_string(), &seed.to_string(), "--board", board]);
+    let mut command = cargo("run --release -- campaign");
+    command.arg(elf).args([&count.to_string(), &seed.to_string(), "--board", board]);
     command.args(rpm.map(|rpm| format!("--rpm={rpm}"))).args(["--class", class]);
     run::step("campaign of faults", &mut command)
 }
@@ -73,13 +75,6 @@ pub struct Faults {
     /// Speed of the shaft, rpm: 850 to 3500; without it the scene is at rest and at low speed
     #[arg(long)]
     pub rpm: Option<u32>,
-}
-
-/// A task of the virtual board as a program.
-fn program(task: &str, elf: &Path) -> Command {
-    let mut command = cargo("run --release --");
-    command.arg(task).arg(elf);
-    command
 }
 
 /// An ignored test with images, run by its name.

@@ -20,8 +20,6 @@
 pub mod addresses;
 pub mod board;
 pub mod campaign;
-pub mod cycles;
-pub mod dump;
 pub mod image;
 pub mod interactive;
 pub mod log;

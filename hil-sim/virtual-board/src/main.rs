@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Parser;
 use virtual_board::power_stage::REFERENCE;
-use virtual_board::{Image, PowerStage, campaign, cycles, dump};
+use virtual_board::{Image, PowerStage, campaign};
 
 /// Runs the firmware's ELF on an emulated board with a simulated motor.
 #[derive(Parser)]
@@ -20,26 +20,6 @@ enum Task {
         /// The board for which the ELF was built, with a motor that suits it.
         #[arg(long, default_value = REFERENCE.name)]
         board: String,
-    },
-    /// Prints the registers of a board that has started, one per line: name, address, value, bits to compare.
-    Dump {
-        /// The ELF.
-        elf: PathBuf,
-        /// The board for which the ELF was built.
-        #[arg(long, default_value = REFERENCE.name)]
-        board: String,
-    },
-    /// Counts the cycles of the control interrupt; fails if they exceed the budgets.
-    Cycles {
-        /// The ELF.
-        elf: PathBuf,
-        /// Budget to the last compare value, cycles.
-        to_compares: u32,
-        /// Budget of the whole interrupt, cycles.
-        whole: u32,
-        /// Shows the functions of the blocks as well.
-        #[arg(long)]
-        functions: bool,
     },
 }
 
@@ -62,18 +42,6 @@ fn run(task: Task) -> Result<()> {
             for table in campaign::run(open, stage, &selection, &[|_, _, _| ()])? {
                 println!("{}", table?);
             }
-        }
-        Task::Dump { elf, board } => {
-            let lines = dump::lines(Image::open(&elf)?, PowerStage::named(&board)?)?;
-            lines.iter().for_each(|line| println!("{line}"));
-        }
-        Task::Cycles { elf, to_compares, whole, functions } => {
-            let rows = cycles::measure(|| Image::open(&elf))?;
-            print!("{}", cycles::table(&rows));
-            if functions {
-                rows.iter().for_each(|row| print!("\n{}", cycles::functions(row)));
-            }
-            cycles::check(&rows, to_compares, whole)?;
         }
     }
     Ok(())

@@ -4,7 +4,9 @@
 use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
-use virtual_board::{Image, PowerStage, dump};
+use virtual_board::{Image, PowerStage};
+
+use crate::common::dump;
 
 #[allow(dead_code, reason = "only names and offsets of the registers are compared here")]
 #[path = "../stm32g4-unicorn/tests/registers/svd.rs"]

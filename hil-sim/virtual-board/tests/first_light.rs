@@ -28,7 +28,9 @@ use induction_drive::boards::Level;
 use stm32g4_unicorn::periph::Reset;
 use virtual_board::board::{Debugger, snapshot::Snapshot};
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
-use virtual_board::{Board, Counting, Image, Options, dump};
+use virtual_board::{Board, Counting, Image, Options};
+
+use crate::common::dump;
 
 use crate::common::program::{Running, command, folder};
 

@@ -1,5 +1,6 @@
 //! Functions for the tests.
 
+pub mod dump;
 pub mod program;
 pub mod script;
 

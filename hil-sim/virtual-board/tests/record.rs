@@ -1,8 +1,5 @@
 //! Records runs of the board: `tests/recorded/NAME.samples` and `NAME.orders`, which `tests/replay/` feeds to a host
 //! drive; see the README there.
-//!
-//! Run it with `cargo run --release --example record` in `hil-sim/virtual-board`, after `cargo firmware` and with the
-//! path that it prints in `INDUCTION_DRIVE_ELF`.
 
 use std::fs;
 use std::path::Path;
@@ -91,7 +88,11 @@ fn record(name: &str, config: &Config, seed: u64, steps: &[Step]) -> Result<()> 
     Ok(())
 }
 
-fn main() -> Result<()> {
+/// After `cargo firmware`, with the path that it prints in `INDUCTION_DRIVE_ELF`: `cargo test --release --test image
+/// records_the_runs -- --ignored` in `hil-sim/virtual-board`.
+#[test]
+#[ignore = "writes the files of the replays anew"]
+fn records_the_runs_of_the_replays() -> Result<()> {
     record("sensorless", &Config::default(), 11, &SENSORLESS)?;
     let mut free = Config::default();
     free.load.mode = LoadMode::Free;

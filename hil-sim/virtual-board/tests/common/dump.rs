@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 
-use crate::{Board, Image, Options, PowerStage};
+use virtual_board::{Board, Image, Options, PowerStage};
 
 /// Time after which every start is over, control periods.
 const STARTED: u64 = 30_000;

@@ -6,17 +6,17 @@
 //! including inlined ones, that is in a block.
 
 use std::collections::BTreeMap;
+use std::env;
 
 use anyhow::{Context, Result, bail, ensure};
 use drive_core::State;
 use hil_sim::{Config, config::LoadMode};
 use induction_drive::board::{LONGEST_INTERRUPT_CYCLES, WAIT_STATES};
-
-use crate::board::{Board, LongestPath, Options, Period, TICKS_PER_PERIOD};
-use crate::{image::Image, pair::Pair};
 use stm32g4_unicorn::chip::Watched;
 use stm32g4_unicorn::cost::{self, BUS, TAKEN, instructions};
 use stm32g4_unicorn::memory;
+use virtual_board::board::{LongestPath, TICKS_PER_PERIOD};
+use virtual_board::{Board, Image, Options, Pair, Period};
 
 /// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match applies.
 const BLOCKS: [(&str, &str); 12] = [
@@ -50,24 +50,22 @@ const WATCHED_PERIODS: u64 = 18_000;
 
 /// A row of the table.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row {
+struct Row {
     /// `sensored` or `sensorless`: the control interrupt. `identification`: a control period in the main loop; the
     /// longest contains a sample of the recursive least squares, the median does not.
-    pub name: &'static str,
+    name: &'static str,
     /// Instructions on the longest path to the last compare value.
-    pub instructions: u32,
+    instructions: u32,
     /// Estimated cycles on that path.
-    pub cycles: u32,
+    cycles: u32,
     /// Median of the estimated cycles to the last compare value while the drive regulates.
-    pub median: u32,
+    median: u32,
     /// Estimated cycles of the longest interrupt, including report, trace and requests after the compare values.
-    pub whole: u32,
+    whole: u32,
     /// Largest number of cycles to the last compare value in each of the ten samples of an injection period.
-    pub by_turn: [u32; 10],
+    by_turn: [u32; 10],
     /// Cycles by block.
-    pub blocks: BTreeMap<&'static str, u32>,
-    /// Cycles by block and innermost function.
-    pub functions: BTreeMap<(&'static str, String), u32>,
+    blocks: BTreeMap<&'static str, u32>,
 }
 
 /// Runs whole scenarios on the board: start, magnetising, torque steps, a reversal, the current limit, stop, with a
@@ -75,13 +73,24 @@ pub struct Row {
 ///
 /// # Errors
 /// The board cannot continue, or its results differ from those of the host; or a path of a block matches no function.
-pub fn measure(image: impl Fn() -> Result<Image>) -> Result<Vec<Row>> {
+fn measure() -> Result<Vec<Row>> {
+    let image = Image::built;
     check_paths(&image()?)?;
     let mut rows = vec![sensored(image()?)?, sensorless(image()?)?, identification(image()?)?];
     for scene in COLD_SCENES {
         rows.push(cold(image()?, scene)?);
     }
     Ok(rows)
+}
+
+/// The budgets are the variables `TO_LAST_COMPARE` and `WHOLE`, cycles.
+#[test]
+#[ignore = "needs the budgets; cargo xtask cycles runs it"]
+fn the_control_interrupt_keeps_its_budgets() -> Result<()> {
+    let budget = |name| anyhow::Ok(env::var(name).context(name)?.parse()?);
+    let rows = measure()?;
+    print!("{}", table(&rows));
+    check(&rows, budget("TO_LAST_COMPARE")?, budget("WHOLE")?)
 }
 
 /// Lines at the console that lead through states whose code is in the flash, and the load of the shaft.
@@ -214,7 +223,7 @@ fn row(
     let blocks = BTreeMap::from([(OVERHEAD[0], entry), (OVERHEAD[1], path.accesses * BUS)]);
     let cycles = path.cycles;
     let mut row = Row { name, cycles, median, whole, by_turn, blocks, ..Row::default() };
-    let mut places: BTreeMap<u32, (&'static str, String)> = BTreeMap::new();
+    let mut places: BTreeMap<u32, &'static str> = BTreeMap::new();
     for block in &path.blocks {
         let mut code = vec![0; block.size as usize];
         board.cpu.read(block.address, &mut code);
@@ -229,9 +238,8 @@ fn row(
         }
         for instruction in list {
             let at = block.address + instruction.offset;
-            let place = places.entry(at).or_insert_with(|| block_of(&board.image, at));
-            *row.blocks.entry(place.0).or_default() += instruction.cycles;
-            *row.functions.entry(place.clone()).or_default() += instruction.cycles;
+            let block = *places.entry(at).or_insert_with(|| block_of(&board.image, at));
+            *row.blocks.entry(block).or_default() += instruction.cycles;
             row.instructions += 1;
         }
     }
@@ -240,8 +248,8 @@ fn row(
     Ok(row)
 }
 
-/// Returns the block of an instruction, and the innermost function around it.
-fn block_of(image: &Image, address: u32) -> (&'static str, String) {
+/// Returns the block of an instruction.
+fn block_of(image: &Image, address: u32) -> &'static str {
     let frames = image.frames(address);
     // From the outermost function inwards; functions that no other block claims belong to the sequence.
     let (named, sequence) = BLOCKS.split_at(BLOCKS.len() - 1);
@@ -251,8 +259,7 @@ fn block_of(image: &Image, address: u32) -> (&'static str, String) {
             blocks.iter().find(|(_, paths)| paths.split(' ').any(matches)).map(|b| b.0)
         })
     };
-    let block = find(named).or_else(|| find(sequence)).unwrap_or(REST);
-    (block, frames.first().map_or_else(String::new, |frame| frame.function.clone()))
+    find(named).or_else(|| find(sequence)).unwrap_or(REST)
 }
 
 /// Checks the rows against these budgets of the control interrupt, cycles: to the last compare value, and whole. A
@@ -260,7 +267,7 @@ fn block_of(image: &Image, address: u32) -> (&'static str, String) {
 ///
 /// # Errors
 /// The row that exceeds a budget, and the budget.
-pub fn check(rows: &[Row], to_compares: u32, whole: u32) -> Result<()> {
+fn check(rows: &[Row], to_compares: u32, whole: u32) -> Result<()> {
     for row in rows {
         let name = row.name;
         let (to_compares, whole) =
@@ -276,7 +283,7 @@ pub fn check(rows: &[Row], to_compares: u32, whole: u32) -> Result<()> {
 }
 
 /// Returns the rows as a table; the share is that of the whole interrupt in the control period.
-pub fn table(rows: &[Row]) -> String {
+fn table(rows: &[Row]) -> String {
     let blocks = || BLOCKS.iter().map(|block| block.0).chain([REST]).chain(OVERHEAD);
     let mut text = format!(
         "{:<16}{:>14}{:>8}{:>8}{:>8}{:>8}",
@@ -298,12 +305,24 @@ pub fn table(rows: &[Row]) -> String {
     text + "\n"
 }
 
-/// Returns the cycles of every function of every block on the longest path, largest first.
-pub fn functions(row: &Row) -> String {
-    let mut list: Vec<_> = row.functions.iter().collect();
-    list.sort_by_key(|(_, cycles)| std::cmp::Reverse(**cycles));
-    let line = |((block, function), cycles): (&(&str, String), &u32)| {
-        format!("{:<16}{cycles:>6} {block:<16} {function}\n", row.name)
+#[test]
+fn an_interrupt_above_a_budget_is_refused_by_its_figure() {
+    let refused = |cycles, whole, from_flash: bool| {
+        let mut blocks = BTreeMap::new();
+        if from_flash {
+            blocks.insert("flash", 100);
+        }
+        let (name, by_turn) = ("x", [0; 10]);
+        let row = Row { name, instructions: 0, cycles, median: 0, whole, by_turn, blocks };
+        check(&[row], 2650, 3700).err().map(|why| why.to_string())
     };
-    list.into_iter().map(line).collect()
+    assert_eq!(refused(2650, 3700, false), None);
+    assert!(
+        refused(2650, 3701, false).is_some_and(|why| why.contains("3701 cycles, 3700 allowed"))
+    );
+    assert!(refused(2651, 3700, false).is_some_and(|w| w.contains("2651") && w.contains("2650")));
+    // States that run from the flash may take as long as the window watchdog allows.
+    let most = COLD;
+    assert_eq!(refused(most, most, true), None);
+    assert!(refused(most, most + 1, true).is_some_and(|why| why.contains("12001")));
 }
