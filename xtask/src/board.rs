@@ -54,10 +54,11 @@ pub fn cycles(elf: &Path) -> Result<()> {
 pub fn campaign(elf: &Path, board: &str, faults: &Faults) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let Faults { count, seed, class, rpm } = faults;
-    let mut command = cargo("run --release -- campaign");
-    command.arg(elf).args([&count.to_string(), &seed.to_string(), "--board", board]);
-    command.args(rpm.map(|rpm| format!("--rpm={rpm}"))).args(["--class", class]);
-    run::step("campaign of faults", &mut command)
+    let mut test = ignored_test("faults_end_in_time");
+    test.env(ELF, elf).env("BOARD", board).env("CLASS", class);
+    test.env("COUNT", count.to_string()).env("SEED", seed.to_string());
+    test.envs(rpm.map(|rpm| ("RPM", rpm.to_string())));
+    run::step("campaign of faults", &mut test)
 }
 
 /// Faults of a campaign.

@@ -7,7 +7,13 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use drive_core::State;
 use hil_sim::Config;
 use rustix::time::{ClockId, clock_gettime};
-use virtual_board::{Counting, Image, Options, Pair};
+use virtual_board::{Counting, Image, Options};
+
+#[allow(dead_code, reason = "the tests use more of it")]
+#[path = "../tests/common/pair.rs"]
+mod pair;
+
+use pair::Pair;
 
 /// Processor time of this process, so that other programs do not count.
 fn processor_time() -> Duration {

@@ -19,17 +19,14 @@
 
 pub mod addresses;
 pub mod board;
-pub mod campaign;
 pub mod image;
 pub mod interactive;
 pub mod log;
-pub mod pair;
 pub mod power_stage;
 pub mod shadow;
 
 pub use board::{Board, Options, Period};
 pub use image::Image;
-pub use pair::Pair;
 pub use power_stage::PowerStage;
 pub use shadow::Shadow;
 pub use stm32g4_unicorn::Counting;

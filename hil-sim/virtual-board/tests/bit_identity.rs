@@ -1,11 +1,12 @@
 //! The ELF and the same drive on the host compute the same bits.
 
 use crate::common;
+use crate::common::pair::Pair;
 use anyhow::Result;
 use drive_core::State;
 use drive_settings::Carrier;
 use hil_sim::Config;
-use virtual_board::{Image, Options, Pair};
+use virtual_board::{Image, Options};
 
 /// A start, magnetising, torque steps, a reversal and a stop, sensorless: every compare value of every control
 /// interrupt is compared where it is written (see `Shadow::follow`).

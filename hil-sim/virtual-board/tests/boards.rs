@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::common::pair::Pair;
 use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::config::LoadMode;
@@ -10,7 +11,7 @@ use induction_drive::boards::{self, ANALOG, CONTACTS, Currents, Level};
 use stm32g4_unicorn::periph::Reset;
 use virtual_board::board::Debugger;
 use virtual_board::power_stage::{ALL, CODES, REFERENCE_V, channel};
-use virtual_board::{Board, Image, Options, Pair, PowerStage};
+use virtual_board::{Board, Image, Options, PowerStage};
 
 use crate::common::off_for;
 

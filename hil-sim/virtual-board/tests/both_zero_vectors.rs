@@ -4,10 +4,11 @@ use crate::common;
 use std::cell::Cell;
 use std::rc::Rc;
 
+use crate::common::pair::Pair;
 use anyhow::Result;
 use drive_core::{Fault, State};
 use hil_sim::Config;
-use virtual_board::{Image, Options, Pair};
+use virtual_board::{Image, Options};
 
 const YES: &str = "set scales.both_zero_vectors yes";
 

@@ -16,7 +16,9 @@ use stm32g4_unicorn::chip::Watched;
 use stm32g4_unicorn::cost::{self, BUS, TAKEN, instructions};
 use stm32g4_unicorn::memory;
 use virtual_board::board::{LongestPath, TICKS_PER_PERIOD};
-use virtual_board::{Board, Image, Options, Pair, Period};
+use virtual_board::{Board, Image, Options, Period};
+
+use crate::common::pair::Pair;
 
 /// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match applies.
 const BLOCKS: [(&str, &str); 12] = [

@@ -1,13 +1,14 @@
 //! Brake chopper and precharge relay at their pins.
 
 use crate::common;
+use crate::common::pair::Pair;
 use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
 use stm32g4_unicorn::periph::Reset;
+use virtual_board::Board;
 use virtual_board::board::Debugger;
-use virtual_board::{Board, Pair};
 
 /// The brake resistor, ohm.
 const OHM: f64 = 100.0;

@@ -1,12 +1,13 @@
 //! Flipped bits while the drive is off and in fault: none of them switches a gate on.
 
+use crate::common::pair::Pair;
 use anyhow::{Result, ensure};
 use drive_core::{Drive, State};
 use hil_sim::Config;
 use stm32g4_unicorn::cpu::Register;
 use virtual_board::addresses::Addresses;
 use virtual_board::board::snapshot::Snapshot;
-use virtual_board::{Board, Image, Pair};
+use virtual_board::{Board, Image};
 
 use crate::common;
 

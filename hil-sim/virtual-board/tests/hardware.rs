@@ -1,5 +1,6 @@
 //! The image against settings and events that may damage its power stage: typed protections and scales, the boot pin, braking.
 
+use crate::common::pair::Pair;
 use anyhow::{Context, Result};
 use drive_core::{Fault, State};
 use hil_sim::Config;
@@ -10,7 +11,7 @@ use stm32g4_unicorn::periph::{Reset, rcc};
 use virtual_board::board::TICKS_PER_PERIOD;
 use virtual_board::board::rom::{N_BOOT0, N_SWBOOT0};
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
-use virtual_board::{Board, Image, Options, Pair};
+use virtual_board::{Board, Image, Options};
 
 use crate::common::{say as ask, until_said as said};
 

@@ -1,11 +1,11 @@
 //! Cycles of the control interrupts that take requests from the console.
 
 use crate::common;
+use crate::common::pair::Pair;
 use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
 use induction_drive::board::{LONGEST_INTERRUPT_CYCLES, PWM_TOP};
-use virtual_board::Pair;
 
 /// Longest time until a request is taken, periods: one that changes a setting runs the design rules first.
 const LONGEST: usize = 30_000;

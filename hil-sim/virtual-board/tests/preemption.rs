@@ -1,5 +1,6 @@
 //! Code that the control interrupt preempts continues undisturbed.
 
+use crate::common::pair::Pair;
 use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
@@ -8,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use virtual_board::board::CONTROL_INTERRUPT;
 use virtual_board::board::poison::Poison;
-use virtual_board::{Counting, Image, Options, Pair};
+use virtual_board::{Counting, Image, Options};
 
 /// Number of control interrupts that are checked.
 const INTERRUPTS: u64 = 100_000;

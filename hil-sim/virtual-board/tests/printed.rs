@@ -1,10 +1,11 @@
 //! The image with the loop of the dissertation: it runs the printed demodulators and the PII controller, and computes the bits of the host.
 
+use crate::common::pair::Pair;
 use anyhow::{Result, ensure};
 use drive_core::printed::DemodulatorKind;
 use drive_core::{Fault, State};
 use hil_sim::Config;
-use virtual_board::{Image, Options, Pair};
+use virtual_board::{Image, Options};
 
 /// Cycles of the control interrupt that `docs/sources.md` names.
 const CYCLES: u32 = 4_000;

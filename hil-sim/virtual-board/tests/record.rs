@@ -4,10 +4,11 @@
 use std::fs;
 use std::path::Path;
 
+use crate::common::pair::Pair;
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::{Config, config::LoadMode};
-use virtual_board::{Image, Options, Pair, Period};
+use virtual_board::{Image, Options, Period};
 
 /// A typed line, the state to wait for, and the periods that follow.
 type Step = (&'static str, Option<State>, u64);

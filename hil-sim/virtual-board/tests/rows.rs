@@ -2,12 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use crate::common::pair::Pair;
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;
 use hil_sim::plant::Plant;
 use hil_sim::rig::wrapped_degrees;
-use virtual_board::{Image, Options, Pair};
+use virtual_board::{Image, Options};
 
 #[path = "../../../tests/rows/played.rs"]
 mod played;

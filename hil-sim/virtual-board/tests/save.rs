@@ -2,7 +2,9 @@
 
 use anyhow::Result;
 use induction_drive::settings::keys;
-use virtual_board::{Image, campaign};
+use virtual_board::Image;
+
+use crate::campaign;
 
 /// Power fails in every operation of the flash of a `save`, an erasure and the double words of the record, to each of
 /// the two slots: the old or the new set is valid, and the firmware starts.

@@ -1,11 +1,11 @@
 //! The stream of the image: its rate, its losses, its cost, and the console beside it.
 
 use crate::common;
+use crate::common::pair::Pair;
 use anyhow::{Context, Result, bail, ensure};
 use drive_core::State;
 use drive_stream::Frame;
 use drive_stream::client::{Answer, Client, Event};
-use virtual_board::Pair;
 
 /// Number of control periods per second.
 const SECOND: u64 = 6000;

@@ -1,11 +1,11 @@
 //! The rotor time constant is identified and used while the image runs.
 
 use crate::common;
+use crate::common::pair::Pair;
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;
 use hil_sim::rig::wrapped_degrees;
-use virtual_board::Pair;
 
 /// Returns the error of the drive's flux angle, degrees: mean over some periods.
 fn angle_error(pair: &mut Pair, periods: u32) -> Result<f64> {

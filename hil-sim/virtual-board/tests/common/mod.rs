@@ -1,12 +1,15 @@
 //! Functions for the tests.
 
 pub mod dump;
+pub mod pair;
 pub mod program;
 pub mod script;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use hil_sim::Config;
-use virtual_board::{Board, Image, Options, Pair};
+use virtual_board::{Board, Image, Options};
+
+use pair::Pair;
 
 /// Longest time from a reset to the greeting, and from a request to its answer, periods.
 const LONGEST: u64 = 30_000;

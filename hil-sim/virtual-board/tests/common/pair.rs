@@ -4,8 +4,7 @@ use anyhow::{Context as _, Result, bail};
 use drive_core::State;
 use drive_stream::client::{Answer, Client, Event};
 
-use crate::board::{Board, Options, Period};
-use crate::{image::Image, shadow::Shadow};
+use virtual_board::{Board, Image, Options, Period, Shadow};
 
 /// Longest time of the firmware from reset to its greeting, or to an answer, periods.
 const LONGEST_ANSWER: u64 = 30_000;

@@ -7,8 +7,8 @@ use serde::Deserialize;
 
 use super::judge::{Outcome, wait};
 use super::scene::Scene;
-use crate::board::{Board, TICKS_PER_PERIOD};
 use stm32g4_unicorn::chip::TICKS_PER_S;
+use virtual_board::board::{Board, TICKS_PER_PERIOD};
 
 /// A fault.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]

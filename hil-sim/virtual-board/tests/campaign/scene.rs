@@ -5,18 +5,17 @@ use std::f64::consts::TAU;
 use anyhow::{Result, bail, ensure};
 use drive_core::State;
 use drive_settings::Settings;
-use hil_sim::config::assigned;
 use hil_sim::{Config, experiments::full_range::for_the_range, plant::Load};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::{Flash, FlashError, Saved};
 use serde::Deserialize;
 
-use crate::board::{Board, Options};
-use crate::{
-    addresses::Addresses, board::Chip, board::snapshot::Snapshot, image::Image, pair::Pair,
-    power_stage::PowerStage,
-};
 use stm32g4_unicorn::memory::{Region, STORED};
+use virtual_board::addresses::Addresses;
+use virtual_board::board::{Chip, snapshot::Snapshot};
+use virtual_board::{Board, Image, Options, PowerStage};
+
+use crate::common::pair::Pair;
 
 /// q-axis current before the injection of a fault, A on the dissertation's motor. At speed its sign also makes the motor generate.
 const TORQUE_A: f64 = 1.5;
@@ -110,20 +109,12 @@ pub struct Scene {
 
 impl Scene {
     /// Starts a board with this power stage and a motor that suits it, once with each angle source. A given speed, rpm
-    /// on four poles, selects settings for the full speed range. `set` holds assignments to the configuration.
+    /// on four poles, selects settings for the full speed range.
     ///
     /// # Errors
-    /// The board does not start, or an assignment is refused.
-    pub fn new(
-        image: Image,
-        stage: &'static PowerStage,
-        set: &[String],
-        rpm: Option<f64>,
-    ) -> Result<Self> {
+    /// The board does not start.
+    pub fn new(image: Image, stage: &'static PowerStage, rpm: Option<f64>) -> Result<Self> {
         let mut config = stage.config()?;
-        for (name, value) in set.iter().map(|one| assigned(one)).collect::<Result<Vec<_>, _>>()? {
-            config.set(name, value)?;
-        }
         let (mut torques, mut speeds) = (vec![config.amperes(TORQUE_A)], SPEEDS_RPM.to_vec());
         if let Some(rpm) = rpm {
             config = for_the_range(&config)?;

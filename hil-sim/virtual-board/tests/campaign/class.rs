@@ -11,10 +11,10 @@ use super::faults::{
 };
 use super::scene::{Source, Target};
 use super::strip::Fault;
-use crate::board::Board;
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
 use stm32g4_unicorn::{chip::TICKS_PER_S, cpu::Register, memory::Region, periph::iwdg::LSI_HZ};
+use virtual_board::board::Board;
 
 /// The procedure of a run.
 #[derive(Clone, Copy, Default, Deserialize)]

@@ -8,10 +8,10 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::scene::Target;
-use crate::board::Board;
 use drive_core::{Line, Sample};
 use drive_settings::CurrentSensors;
 use stm32g4_unicorn::memory::{FLASH, Region, STORED};
+use virtual_board::board::Board;
 
 /// Selects the ADC counts of a quantity in a sample.
 type Code = fn(&mut Sample) -> &mut u16;

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use anyhow::{Result, bail, ensure};
 
-use crate::board::{Board, TICKS_PER_PERIOD};
 use stm32g4_unicorn::{chip::TICKS_PER_S, periph::Reset};
+use virtual_board::board::{Board, TICKS_PER_PERIOD};
 
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;
