@@ -17,7 +17,6 @@ pub mod identify_trace;
 pub mod identify_validate;
 pub mod injection_map;
 pub mod learn_reference;
-pub mod linear_model;
 pub mod measured_motors;
 pub mod measured_start;
 pub mod modulation;

@@ -1,15 +1,23 @@
-//! Perturbation analysis: the angle error after steps of the load and of the q-axis current, measured and predicted.
+//! Perturbation analysis: the angle error after steps of the load and of the q-axis current.
 
-use crate::linear_model::{Disturbance, LinearModel, LinearResponse};
 use crate::prelude::*;
 
 /// Number of seeds over which the measured response is averaged; a fifth of the noise remains.
 const SEEDS: u64 = 24;
-/// Time before the step that is included in the comparison, and time after it, s.
+/// Time before the step over which the mean is taken, and time after it that is measured, s.
 const BEFORE_S: f64 = 0.5;
 const AFTER_S: f64 = 1.5;
 
-/// One disturbance.
+/// A disturbance.
+#[derive(Clone, Copy)]
+enum Disturbance {
+    /// Step of the q-axis current reference, A; the shaft is locked.
+    TorqueCurrent(f64),
+    /// Step of the load torque, Nm; the shaft is free.
+    Load(f64),
+}
+
+/// A step and the state before it.
 #[derive(Clone, Copy)]
 struct StepCase {
     name: &'static str,
@@ -58,7 +66,7 @@ const CASES: [StepCase; 8] = [
     current("3 A to -3 A, rotor 30 % warmer", 3.0, -3.0, 1.3),
 ];
 
-/// Measured and predicted response of a case.
+/// Response of a case.
 struct StepResponse {
     case: StepCase,
     /// Mean over the seeds, minus the mean before the step.
@@ -67,14 +75,6 @@ struct StepResponse {
     /// Largest single error, including noise.
     largest: f64,
     lost: usize,
-    predicted: LinearResponse,
-}
-
-impl StepResponse {
-    /// Measured minus predicted, rms, degrees.
-    fn fit(&self) -> f64 {
-        Stats::of(self.angle.iter().zip(&self.predicted.angle_deg).map(|(m, p)| m - p)).rms()
-    }
 }
 
 fn peak(of: &[f64]) -> f64 {
@@ -116,20 +116,11 @@ fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f6
 
 fn measure(config: &Config, case: StepCase, seed: u64) -> Result<StepResponse, Error> {
     let config = configured(config, &case);
-    let (plant, drive) = (plant_settings(&config), config.drive);
-    // The final state of the drive, which applies to most of the response.
-    let i_q = match case.disturbance {
-        Disturbance::Load(nm) => nm / f64::from(drive.motor.torque_per_ampere(drive.i_d())),
-        Disturbance::TorqueCurrent(by) => case.from + by,
-    };
-    let linear = LinearModel::new(&plant.machine, &plant.mechanics, &drive, i_q)?;
-    let predicted = linear.response(case.disturbance, AFTER_S);
-
     let run = |n| one(&config, &case, seed.wrapping_add(n));
     let runs: Vec<_> = (0..SEEDS).into_par_iter().map(run).collect::<Result<_, _>>()?;
     let mean = |of: usize| -> Vec<f64> {
         let at = |k: usize| runs.iter().map(|(points, ..)| points[k][of] / SEEDS as f64).sum();
-        (0..predicted.angle_deg.len()).map(at).collect()
+        (0..runs[0].0.len()).map(at).collect()
     };
     Ok(StepResponse {
         case,
@@ -137,7 +128,6 @@ fn measure(config: &Config, case: StepCase, seed: u64) -> Result<StepResponse, E
         speed: mean(1),
         largest: runs.iter().map(|(_, largest, _)| *largest).fold(0.0, f64::max),
         lost: runs.iter().filter(|(.., lost)| *lost).count(),
-        predicted,
     })
 }
 
@@ -159,9 +149,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     for m in &results {
         table.record([
             ("step", Cell::from(m.case.name)),
-            ("peak, measured (°)", Cell::fixed(peak(&m.angle), 2)),
-            ("predicted (°)", Cell::fixed(peak(&m.predicted.angle_deg), 2)),
-            ("fit, rms of the difference (°)", Cell::fixed(m.fit(), 2)),
+            ("peak (°)", Cell::fixed(peak(&m.angle), 2)),
             ("largest single error (°)", Cell::fixed(m.largest, 2)),
         ]);
     }
@@ -171,14 +159,11 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     };
     let metrics = &mut outcome.metrics;
     metrics.set("load_step_error_max_deg", most(&|m| m.largest, &is_load));
-    metrics.set("load_step_fit_rms_deg", most(&StepResponse::fit, &is_load));
     metrics.set("load_step_dip_rpm", most(&|m| peak(&m.speed).abs(), &is_load));
     let known = |m: &&StepResponse| !is_load(m) && m.case.warmer == 1.0;
     let warm = |m: &&StepResponse| m.case.warmer > 1.0;
     metrics.set("current_step_error_max_deg", most(&|m| m.largest, &known));
-    metrics.set("current_step_fit_rms_deg", most(&StepResponse::fit, &known));
     metrics.set("current_step_warm_error_max_deg", most(&|m| m.largest, &warm));
-    metrics.set("current_step_warm_fit_rms_deg", most(&StepResponse::fit, &warm));
     metrics.set("lost_runs", results.iter().map(|m| m.lost).sum::<usize>() as f64);
 
     let mut figure = texts::figure("perturbation", "perturbation");
@@ -189,17 +174,14 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         };
         of.chunks(10).enumerate().map(mean).collect::<Vec<_>>()
     };
-    let panel = |y: String, measured: &[f64], predicted: &[f64]| {
-        Panel::new("time after the step (s)", y)
-            .with(Series::line("measured", line(measured)))
-            .with(Series::reference("linear model", line(predicted)))
+    let panel = |y: String, mean: &[f64]| {
+        Panel::new("time after the step (s)", y).with(Series::line("measured", line(mean)))
     };
     for m in &results {
         let name = m.case.name;
-        figure = figure.panel(panel(format!("{name} (°)"), &m.angle, &m.predicted.angle_deg));
+        figure = figure.panel(panel(format!("{name} (°)"), &m.angle));
         if is_load(&m) {
-            let y = format!("{name} (rpm)");
-            speeds = speeds.panel(panel(y, &m.speed, &m.predicted.speed_rpm));
+            speeds = speeds.panel(panel(format!("{name} (rpm)"), &m.speed));
         }
     }
     outcome.figures.push(figure);

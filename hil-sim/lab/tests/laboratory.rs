@@ -1,19 +1,15 @@
 //! Tests of parts of the laboratory: models, signals, filters and designs, each against known results.
 
-use std::f64::consts::{FRAC_PI_3, TAU};
+use std::f64::consts::FRAC_PI_3;
 
 use drive_core::printed::DemodulatorKind;
-use drive_core::table::{Grid, POINTS, ReferenceTable};
-use drive_settings::Settings;
 use drive_settings::tuning::rule_3_8;
 use sim_bench::Config;
-use sim_bench::plant::{MachineSettings, MechanicsSettings};
 use sim_bench::rig::Rig;
 use sim_lab::angle_identification::measure::{Record, filter_alone, steps};
 use sim_lab::angle_identification::model::{Model, Pii};
 use sim_lab::identification::Complex;
 use sim_lab::identification::signals::{Filter, Prbs, schroeder, six_step};
-use sim_lab::linear_model::{Disturbance, LinearModel};
 use sim_lab::pi_design;
 use sim_lab::poles::largest_pole;
 use sim_lab::recomputed::{PERIOD_S, plant};
@@ -84,44 +80,6 @@ fn the_leak_turns_with_the_current_and_the_flux_does_not() {
     let fast = 2.0 * (0.035 + 0.036 * 4.49_f64.sqrt() * cos_2_gamma);
     assert!((held / fast - 1.0).abs() < 0.2, "{held} {fast}");
     assert!((slow / 0.07 - 1.0).abs() < 0.25, "{slow}");
-}
-
-fn linear(i_q: f64, settings: &Settings) -> LinearModel {
-    let (machine, mechanics) = (MachineSettings::default(), MechanicsSettings::default());
-    LinearModel::new(&machine, &mechanics, settings, i_q).unwrap()
-}
-
-/// If the slip is constant, the tracking loop responds to a step d of its frequency with the error d s / ((s + w_n)^2
-/// (s + w_n/5)), whose peak is 0.3240 d / w_n. The step is a rotor resistance 10 % off at a small current, at which the
-/// slip hardly depends on the angle and the delays are short.
-#[test]
-fn a_wrong_slip_has_the_peak_of_the_tracking_loop() {
-    let mut settings = Settings::default();
-    settings.motor.r_r *= 0.9;
-    // Slow compared with the delays, fast compared with the rotor.
-    settings.injection.synchronous.bandwidth_hz = 6.0;
-    // No saliency of the current, because its transient looks like an angle error.
-    settings.injection.synchronous.reference =
-        ReferenceTable::from_points(Grid::REFERENCE, [0.0; POINTS]);
-    let response = linear(0.01, &settings).response(Disturbance::TorqueCurrent(0.1), 0.4);
-    let t_r = 0.2047 / 1.1;
-    let wrong = 0.1 * (1.0 - 0.9) / (t_r * 0.7);
-    let expected = 0.3240 * wrong / (TAU * 6.0) * 360.0 / TAU;
-    // The peak comes after 1/w_n = 27 ms; the current has settled by 10 ms.
-    let peak = response.angle_deg[60..].iter().copied().fold(0.0, f64::max);
-    // The peak is higher because the 3.2 ms of the averages reduce the damping: 1.14 at this bandwidth, from a separate
-    // integration of only the averages and the loop. The rise of the current causes the rest.
-    assert!((1.1..1.2).contains(&(peak / expected)), "{peak} of {expected}");
-}
-
-/// After a load step the speed returns, with the current that carries the load.
-#[test]
-fn the_speed_loop_brings_the_rotor_back() {
-    let response = linear(1.0, &Settings::default()).response(Disturbance::Load(0.2), 6.0);
-    let dip = response.speed_rpm.iter().copied().fold(0.0, f64::min);
-    assert!((-60.0..-5.0).contains(&dip), "{dip}");
-    assert!(response.speed_rpm.last().unwrap().abs() < 0.05);
-    assert!(response.angle_deg.last().unwrap().abs() < 0.05);
 }
 
 #[test]
