@@ -2,8 +2,7 @@
 
 use rotor_id::rls::{Rls, RlsSettings};
 
-use crate::identification::recursive::Reference;
-use crate::identification::signals::{Filter, noise};
+use crate::identification::signals::noise;
 use crate::identification::trial::{CORNER, Noise, VOLTAGE, peaks};
 use crate::identification::{Complex, Delta, Parameters, Signal, Trial, Value, model_c};
 use crate::prelude::*;
@@ -23,39 +22,27 @@ const CASES: [(&str, Signal, f64, Option<f64>); 3] = [
     ("Figure 4", Signal::Schroeder, 57.6, None),
 ];
 
-/// One run: Model C at every sample in `f32`, and the difference of the speed to `f64`.
-struct Run {
-    estimates: Vec<[Value; 5]>,
-    speed_rms: f64,
-}
+/// Parameters by Model C at every sample.
+type Estimates = Vec<[Value; 5]>;
 
-fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run, Error> {
+fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Estimates, Error> {
     let corner = CORNER * TAU * trial.hz;
     let paper = RlsSettings::paper(VOLTAGE as f32, CURRENT as f32);
     let settings = RlsSettings { corner: (corner * H) as f32, ..paper };
-    let mut single = Rls::new(settings)
+    let mut rls = Rls::new(settings)
         .map_err(|_| Error::Internal("a setting of the least squares is out of range".into()))?;
-    let mut double = Reference::new(f64::from(settings.lambda), f64::from(settings.p0));
-    let filter = Filter::new(corner, H);
-    let (mut on_v, mut on_i) = (filter, filter);
     let peak = peaks(trial.raw().skip(RATE).take(RATE / 5));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let (mut estimates, mut square, mut count) = (Vec::new(), 0.0, 0u32);
-    let samples = (seconds * RATE as f64) as usize;
-    for (n, (v, i)) in trial.raw().skip(RATE).take(samples).enumerate() {
+    let mut estimates = Vec::new();
+    for (v, i) in trial.raw().skip(RATE).take((seconds * RATE as f64) as usize) {
         let v = v + noise(&mut rng, level.voltage * peak[0]);
         let i = i + noise(&mut rng, level.current * peak[1]);
         let narrow = |x: Complex| AlphaBeta { alpha: x.re as f32, beta: x.im as f32 };
-        single.step(narrow(v), narrow(i));
-        double.step(on_v.step(v / VOLTAGE), on_i.step(i / CURRENT));
-        let [g1, g0, h1, u0] = single.latest().map(|x| Complex::new(x.re.into(), x.im.into()));
-        if n >= samples / 2 {
-            square += ((g1 - double.delta().g1).im / H).powi(2);
-            count += 1;
-        }
-        estimates.push(model_c(&Delta { g1, g0, h1, u0 }, H).array());
+        rls.step(narrow(v), narrow(i));
+        let theta = rls.latest().map(|x| Complex::new(x.re.into(), x.im.into()));
+        estimates.push(model_c(&Delta::from_array(theta), H).array());
     }
-    Ok(Run { estimates, speed_rms: (square / f64::from(count.max(1))).sqrt() })
+    Ok(estimates)
 }
 
 /// Time after which a parameter stays within 10 % of its final value, s, by a moving median over 20 ms.
@@ -87,7 +74,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         bar.inc(1);
         let noisy = estimate(&trial, Noise::TENTH, seconds, context.seed)?;
         bar.inc(1);
-        let times = [0, 1].map(|k| convergence(&clean.estimates, k));
+        let times = [0, 1].map(|k| convergence(&clean, k));
         slowest[index] = times[0].max(times[1]);
         table.record([
             ("figure", Cell::from(source)),
@@ -96,7 +83,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             ("r_s converges (s)", Cell::fixed(times[0], 3)),
             ("τ_r converges (s)", Cell::fixed(times[1], 3)),
             ("paper, worst (s)", Cell::or_dash(paper.map(|paper| Cell::fixed(paper, 1)))),
-            ("speed, f32 − f64 (rad/s rms)", Cell::significant(noisy.speed_rms, 2)),
         ]);
         if paper.is_some() {
             let quantity = "convergence time of r_s and tau_r, the slowest, Sg";
@@ -107,13 +93,12 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let key = format!("figure_{}", index + 2);
         outcome.metrics.set(format!("{key}_r_s_converges_s"), times[0]);
         outcome.metrics.set(format!("{key}_tau_r_converges_s"), times[1]);
-        outcome.metrics.set(format!("{key}_f32_omega_m_rms_rad_s"), noisy.speed_rms);
-        outcome.figures.push(figure(&key, source, &trial, &noisy.estimates, paper));
+        outcome.figures.push(figure(&key, source, &trial, &noisy, paper));
         // The ordinates of the paper hold for its own machine.
         let trial = Trial { machine: Parameters::RBV.at(speed), ..trial };
         let theirs = estimate(&trial, Noise::TENTH, seconds, context.seed)?;
         let key = format!("{key}_table_6");
-        outcome.figures.push(figure(&key, source, &trial, &theirs.estimates, paper));
+        outcome.figures.push(figure(&key, source, &trial, &theirs, paper));
     }
     outcome.compared.extend([
         named("sg_converges_later").simulated(slowest[1] > slowest[2]),

@@ -5,4 +5,5 @@ mod faults;
 mod laboratory;
 mod model;
 mod recursive;
+mod reference;
 mod structured;

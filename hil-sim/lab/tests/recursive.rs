@@ -10,10 +10,11 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use rotor_id::rls::{Rls, RlsSettings};
 use sim_lab::identification::models::model_c;
-use sim_lab::identification::recursive::Reference;
 use sim_lab::identification::signals::{Filter, noise};
 use sim_lab::identification::trial::{Noise, VOLTAGE, peaks};
 use sim_lab::identification::{Complex, Delta, Parameters, Signal, Trial};
+
+use crate::reference::Reference;
 
 const H: f64 = 50e-6;
 const CURRENT: f64 = 30.0;

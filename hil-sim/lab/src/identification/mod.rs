@@ -22,7 +22,6 @@ pub mod models;
 pub mod output_error;
 pub mod printed;
 pub mod ratios;
-pub mod recursive;
 pub mod signals;
 pub mod structured;
 pub mod study;

@@ -1,6 +1,6 @@
 //! Recursive least squares in `f64`, as reference for `rotor_id::rls`.
 
-use super::{Complex, Delta};
+use sim_lab::identification::{Complex, Delta};
 
 /// U D Uᴴ recursion in differences, the algorithm of `rotor_id::rls` without its guards.
 #[derive(Clone, Copy, Debug)]
