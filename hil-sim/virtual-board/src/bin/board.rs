@@ -7,12 +7,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use clap::Parser;
+use hil_sim::first_light::interruptible;
 use hil_sim::report::{self, Section};
 use hil_sim::{Config, Error};
 use hil_sim::{board::Options, outcome::Origin};
-use signal_hook::consts::{SIGINT, SIGTERM};
 use virtual_board::interactive::flash_file::FlashFile;
 use virtual_board::interactive::page;
 use virtual_board::interactive::pty::Pty;
@@ -48,10 +48,7 @@ fn run(mut options: Options) -> Result<()> {
     let script = script.transpose()?;
     let image = image(stage, options.elf.as_deref())?;
     let (pty, bus) = (Pty::open()?, Pty::open()?);
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, stop.clone()).context("cannot listen for Ctrl-C")?;
-    }
+    let stop = interruptible()?;
     let mut board =
         Board::new(image, virtual_board::Options::on(stage, &config, options.input.seed))?;
     let kept = options.flash.as_deref().is_some_and(Path::exists);
