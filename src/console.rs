@@ -174,11 +174,11 @@ impl Console {
         self.out.begin_answer(None);
         let mut line = match line {
             Ok(line) => line,
-            Err(why) => return self.error(&why),
+            Err(why) => return self.leave_out(&why, desk),
         };
         match grammar::tagged(&line) {
             Ok((tag, _)) => self.out.begin_answer(tag),
-            Err(why) => return self.error(&why),
+            Err(why) => return self.leave_out(&why, desk),
         }
         line.make_ascii_lowercase();
         let request = grammar::tagged(&line).map_or("", |(_, request)| request);
@@ -197,16 +197,22 @@ impl Console {
         self.line_ms = Some(now_ms);
     }
 
+    /// Refuses a line that may belong to a backup.
+    fn leave_out(&mut self, why: &dyn fmt::Display, desk: &mut Desk) {
+        desk.leave_out();
+        self.error(why);
+    }
+
     /// Answers an invalid line; for an invalid value the answer states the allowed range.
-    fn refuse(&mut self, why: &ParseError<'_>, desk: &Desk) {
+    fn refuse(&mut self, why: &ParseError<'_>, desk: &mut Desk) {
         let range = match why {
             ParseError::Value { key, .. } => {
                 key.range(desk.settings().latest()).zip(Some(key.unit()))
             }
             _ => None,
         };
-        let Some(((min, max), unit)) = range else { return self.error(why) };
+        let Some(((min, max), unit)) = range else { return self.leave_out(why, desk) };
         let space = if unit.is_empty() { "" } else { " " };
-        self.error(&format_args!("{why}; allowed is {min} to {max}{space}{unit}"));
+        self.leave_out(&format_args!("{why}; allowed is {min} to {max}{space}{unit}"), desk);
     }
 }

@@ -18,6 +18,7 @@ use drive_core::learned::Learned;
 use drive_core::{Accepted, Command, Mode, Refused, State, Stop};
 use drive_settings::entry::Change;
 
+use crate::boards::Board;
 use crate::settings::FirmwareSettings;
 use crate::settings::staging::{Applied, Assignments, Staging, guarded};
 use crate::settings::{BUS_SILENT_S, Commander};
@@ -52,8 +53,11 @@ pub struct Desk {
     settings: Staging,
     /// Whether settings in force were changed since they were saved.
     unsaved: bool,
-    /// The board that the received lines belong to, if it is not this one.
-    foreign: Option<&'static str>,
+    /// The board of the backup whose lines the console receives, from `board NAME` until they are in force or dropped. `Some(None)` is a
+    /// board that this firmware does not know.
+    backup_of: Option<Option<&'static Board>>,
+    /// Number of its lines that were refused: without them the staged settings are not the ones that were backed up.
+    left_out: u16,
     /// The board that the settings in the flash were saved on, if it is not this one. The gates stay unconnected until the user confirms
     /// which of the two boards this is.
     pub saved_on: Option<&'static str>,
@@ -98,7 +102,8 @@ impl Desk {
         Self {
             settings: Staging::new(settings),
             unsaved: false,
-            foreign: None,
+            backup_of: None,
+            left_out: 0,
             saved_on: None,
             task: None,
             waits: 0,
@@ -262,7 +267,13 @@ impl Desk {
 
     fn dispatch(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         match order {
-            Order::Apply if !self.settings.is_staged() => Ok(Reply::NothingStaged),
+            Order::Apply if !self.settings.is_staged() => {
+                self.end_backup(true).map(|()| Reply::NothingStaged)
+            }
+            Order::ApplyRest => {
+                self.left_out = 0;
+                self.dispatch(from, Order::Apply, drive)
+            }
             Order::Start(_)
             | Order::Learn { .. }
             | Order::Commission(..)
@@ -292,11 +303,13 @@ impl Desk {
             Order::Defaults => {
                 may_stage(drive)?;
                 self.saved_on = None;
+                // No line before this one counts any more.
+                self.left_out = 0;
                 self.settings.set_defaults();
                 Ok(self.staged())
             }
             Order::Revert => {
-                self.foreign = None;
+                (self.backup_of, self.left_out) = (None, 0);
                 let count = self.settings.count();
                 self.settings.revert();
                 Ok(Reply::Dropped(count))
@@ -317,8 +330,7 @@ impl Desk {
                 self.reboot(from, order, false, drive).map(|()| Reply::Loader)
             }
             Order::BoardIs(board) => {
-                let own = self.settings.in_force().board;
-                self.foreign = (board != own).then_some(board.name);
+                self.backup_of = Some(board);
                 self.is_own_board().map(|()| Reply::Done)
             }
             Order::Confirm => {
@@ -361,8 +373,34 @@ impl Desk {
     /// # Errors
     /// The lines belong to another board.
     fn is_own_board(&self) -> Result<(), Refusal> {
-        let own = self.settings.in_force().board.name;
-        self.foreign.map_or(Ok(()), |theirs| Err(Refusal::WrongBoard { theirs, own }))
+        let own = self.settings.in_force().board;
+        match self.backup_of {
+            Some(board) if board != Some(own) => {
+                let theirs = board.map(|board| board.name);
+                Err(Refusal::WrongBoard { theirs, own: own.name })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Notes that a line of the console was refused. If it belongs to a backup, nothing starts until the user has decided about the rest.
+    pub fn leave_out(&mut self) {
+        self.left_out = self.left_out.saturating_add(self.backup_of.is_some().into());
+    }
+
+    /// Ends the backup that the console receives, because its lines are about to be put in force.
+    ///
+    /// # Errors
+    /// The lines belong to another board, some of them were refused, or they may not be all: the last line of a backup `applies`.
+    fn end_backup(&mut self, applies: bool) -> Result<(), Refusal> {
+        self.is_own_board()?;
+        match self.left_out {
+            0 if applies || self.backup_of.is_none() => {}
+            0 => self.nothing_staged()?,
+            lines => return Err(Refusal::LeftOut(lines)),
+        }
+        self.backup_of = None;
+        Ok(())
     }
 
     /// Passes if the settings in the flash were not saved on another board.
@@ -419,7 +457,7 @@ impl Desk {
             Order::Learn { .. } if !drive.is_off() => return self.start(Mode::Learning, drive),
             _ => must_be_off(drive)?,
         }
-        self.is_own_board()?;
+        self.end_backup(order == Order::Apply)?;
         if order.is_for_the_commander(Commander::Console) {
             self.is_own_record()?;
             if !self.settings.latest().board_is_confirmed() {
@@ -588,6 +626,7 @@ impl Desk {
     /// Puts the results of the commissioning in force, and saves them.
     fn accept(&mut self, from: Commander, drive: &mut impl DriveHandle) -> Answer {
         may_stage(drive)?;
+        self.end_backup(false)?;
         let found = drive.session().found(&self.settings.latest().drive);
         self.settings.stage(found.ok_or(Refusal::NothingFound)?);
         self.design(from, Order::Save, drive)

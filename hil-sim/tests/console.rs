@@ -40,6 +40,8 @@ impl Firmware {
             ["help"] => "status   the state\r\nset KEY VALUE  sets\r\nok\r\n".into(),
             ["status"] => "* fault 4: dc link above its limit\r\noff; i_d 0.00 A\r\n".into(),
             ["trace", ..] => "t_s,i_q_a,v_q_v\r\n0,1,20\r\n0.1,2,30\r\nok\r\n".into(),
+            ["board"] => "board bench: two settings\r\nok\r\n".into(),
+            ["board", "bench"] | ["apply" | "revert"] => "ok\r\n".into(),
             ["backup"] => listed(&|(name, value)| format!("set {name} {value}")),
             ["describe"] => {
                 listed(&|(name, value)| format!("{{\"name\":\"{name}\",\"value\":{value}}}"))
@@ -147,14 +149,29 @@ fn settings_go_to_a_file_and_back() {
     assert_eq!(text, "set motor.r_r 1.1\nset motor.r_s 5.4\n");
     assert_eq!(firmware.lock().unwrap().settings["motor.r_s"], 5.4);
 
-    std::fs::write(&file, "# mine\n\nset motor.r_r 2\nset motor.r_s 77\nset motor.r_r 3\n")
-        .unwrap();
+    // The rest is sent, but not what would put it in force without the refused lines.
+    let lines = "# mine\n\nset motor.r_r 2\nset motor.r_s 77\nset motor.r_r 3\nset new 1\napply\n";
+    std::fs::write(&file, lines).unwrap();
     let (code, _, err) = texts(&console(&port, &[&restore]));
     assert_eq!(code, Some(1));
-    for said in ["drive.txt, line 4: `set motor.r_s 77`", "allowed 0.1 to 9", "1 lines before"] {
+    for said in [
+        "drive.txt, line 4: `set motor.r_s 77`: ",
+        "allowed 0.1 to 9\nline 6: `set new 1`: ",
+        "`apply rest`",
+    ] {
         assert!(err.contains(said), "{said} is not in {err}");
     }
-    assert_eq!(firmware.lock().unwrap().settings["motor.r_r"], 2.0, "it stops at the error");
+    let heard = std::mem::take(&mut firmware.lock().unwrap().heard);
+    let last =
+        ["board bench", "set motor.r_r 2", "set motor.r_s 77", "set motor.r_r 3", "set new 1"];
+    assert!(heard.ends_with(&last.map(str::to_owned)), "{heard:?}");
+    // A file of another kind is dropped before it is sent whole.
+    std::fs::write(&file, "what is this?\n".repeat(40)).unwrap();
+    let (code, _, err) = texts(&console(&port, &[&restore]));
+    assert!(code == Some(1) && err.contains("all its lines are dropped"), "{err}");
+    let heard = &firmware.lock().unwrap().heard;
+    let sent = heard.iter().filter(|line| line.starts_with("what")).count();
+    assert_eq!((sent, heard.last().map(String::as_str)), (21, Some("revert")));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::handle::Firmware;
 use super::number::Significant;
 use super::words::UNCONFIRMED;
 use super::{Console, reply};
-use crate::desk::order::Reply;
+use crate::desk::order::{Order, Reply};
 use crate::desk::{Answer, Desk, may_stage};
 use crate::recording::trace::{Plan, SIGNALS, Trigger};
 use crate::settings::Commander;
@@ -21,8 +21,15 @@ impl Console {
     #[inline(never)]
     pub(super) fn answer(&mut self, request: Request, desk: &mut Desk, drive: &mut impl Firmware) {
         match request {
+            Request::Order(Order::Defaults) => {
+                let answer = desk.order(Commander::Console, Order::Defaults, drive);
+                self.reply_to_part(&answer, desk);
+            }
             Request::Order(order) => self.reply(&desk.order(Commander::Console, order, drive)),
-            Request::Set(values) => self.reply(&desk.set(Commander::Console, &values, drive)),
+            Request::Set(values) => {
+                let answer = desk.set(Commander::Console, &values, drive);
+                self.reply_to_part(&answer, desk);
+            }
             Request::List(kind) => self.begin(kind),
             Request::Status => self.status(desk, drive),
             Request::Get(key) => {
@@ -39,7 +46,7 @@ impl Console {
             }
             Request::Restore(index, words) => match self.restore.take(index, &words) {
                 Ok(()) => self.ok(),
-                Err(why) => self.error(&why),
+                Err(why) => self.leave_out(&why, desk),
             },
             Request::Restored(check) => self.restored(check, desk, drive),
             Request::Faults(fault) => self.faults(fault, drive),
@@ -74,6 +81,14 @@ impl Console {
         }
     }
 
+    /// Writes the answer of the command arbiter to a line that may be part of a backup.
+    fn reply_to_part(&mut self, answer: &Answer, desk: &mut Desk) {
+        if answer.is_err() {
+            desk.leave_out();
+        }
+        self.reply(answer);
+    }
+
     /// Writes the answer of the command arbiter.
     pub(super) fn reply(&mut self, answer: &Answer) {
         match answer {
@@ -87,11 +102,11 @@ impl Console {
         let both = desk.settings().latest().drive.scales.both_zero_vectors;
         // The received words are kept for another try.
         if let Err(why) = may_stage(drive) {
-            return self.error(&why);
+            return self.leave_out(&why, desk);
         }
         match self.restore.finish(check, both) {
             Ok(learned) => self.reply(&desk.restore(learned, drive)),
-            Err(why) => self.error(&why),
+            Err(why) => self.leave_out(&why, desk),
         }
     }
 

@@ -3,6 +3,7 @@
 
 use core::fmt::{self, Display, Formatter, Result};
 
+use crate::boards::ALL_NAMES;
 use crate::desk::handle::CommandError;
 use crate::desk::order::{LOADER_DC_LINK_V, Refusal};
 use crate::monitor::record::{Reason, Record};
@@ -30,7 +31,9 @@ impl Display for Refusal {
             Self::Design(why) => write!(f, "{why}; not in force, still staged"),
             Self::Set(why) => why.fmt(f),
             Self::Flash(why) => why.fmt(f),
-            Self::WrongBoard { theirs, own } => write!(f, "these lines belong to the board {theirs}, this is {own}; `revert` drops them"),
+            Self::WrongBoard { theirs: Some(theirs), own } => write!(f, "these lines belong to the board {theirs}, this is {own}; `revert` drops them"),
+            Self::WrongBoard { theirs: None, own } => write!(f, "these lines belong to none of the boards {ALL_NAMES}, this is {own}; `revert` drops them"),
+            Self::LeftOut(lines) => write!(f, "lines of the backup that were refused: {lines}; `apply rest` puts the others in force, `revert` drops all"),
             Self::SavedOn { theirs, own } => write!(f, "this image is for the board {own}, the saved settings are of {theirs}: flash the image of {theirs}; only if this is a {own}: `defaults`, bench steps, `confirm board`"),
             Self::NotConfirmed => f.write_str("the board's polarities, dead time and scales are assumed, or were changed: do the bench steps that `board` lists, then `confirm board`"),
             Self::Staged => f.write_str("there are staged values: `apply` or `revert` first"),

@@ -47,6 +47,8 @@ pub enum Order {
     Defaults,
     /// Put the staged settings in force.
     Apply,
+    /// Put the staged settings in force, without the lines of the backup that were refused.
+    ApplyRest,
     /// Drop the staged settings.
     Revert,
     /// Put the staged settings in force and save all, with what was learned.
@@ -57,8 +59,8 @@ pub enum Order {
     Reboot(bool),
     /// Reset the controller into ST's loader: the gate drivers have no supply.
     Update,
-    /// Check that the lines that follow belong to this board.
-    BoardIs(&'static Board),
+    /// Begin a backup: check that the lines that follow belong to this board. `None` is a board that this firmware does not know.
+    BoardIs(Option<&'static Board>),
     /// Note that the bench steps of the board were done, and save.
     Confirm,
 }
@@ -142,8 +144,8 @@ pub enum Refusal {
     Flash(#[from] FlashError),
     /// Settings of another board.
     WrongBoard {
-        /// The board of the lines.
-        theirs: &'static str,
+        /// The board of the lines; `None` if this firmware does not know it.
+        theirs: Option<&'static str>,
         /// This board.
         own: &'static str,
     },
@@ -154,6 +156,8 @@ pub enum Refusal {
         /// The board of the image.
         own: &'static str,
     },
+    /// This number of lines of a backup was refused.
+    LeftOut(u16),
     /// The board is not confirmed.
     NotConfirmed,
     /// Values are staged.

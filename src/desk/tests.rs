@@ -83,12 +83,13 @@ fn orders() -> Vec<(Order, &'static str)> {
         (Order::Clear, "+++c++"),
         (Order::Defaults, "+o+c++"),
         (Order::Apply, "++++++"),
+        (Order::ApplyRest, "++++++"),
         (Order::Revert, "++++++"),
         (Order::Save, "+o++++"),
         (Order::Echo(true), "++++++"),
         (Order::Reboot(false), "+o+++u"),
         (Order::Reboot(true), "+o++++"),
-        (Order::BoardIs(boards::ALL[0]), "++++++"),
+        (Order::BoardIs(Some(boards::ALL[0])), "++++++"),
         (Order::Confirm, "+o+++s"),
     ]
 }

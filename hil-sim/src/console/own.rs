@@ -21,7 +21,7 @@ pub enum Own {
 pub const HELP: [(&str, &str); 5] = [
     ("!help", "lists the commands of this program; other lines go to the drive"),
     ("!backup FILE", "writes the drive's settings to a file"),
-    ("!restore FILE", "sends the lines of such a file, one by one, up to the first error"),
+    ("!restore FILE", "sends the lines of such a file and lists those that the drive refuses"),
     ("!plot [FILE.svg]", "draws the last trace; the default file is out/trace.svg"),
     ("!quit", "ends this program; also quit or Ctrl-D"),
 ];

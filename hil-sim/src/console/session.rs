@@ -103,7 +103,9 @@ impl Session {
             }
         });
         let lines = done.map_err(|why| Error::Internal(format!("!restore {name}, {why}")))?;
-        say(&format!("{lines} lines of {name} restored; `save` keeps them over a reset"));
+        say(&format!(
+            "{lines} lines of {name} restored; `apply` puts them in force if no line did, `save` keeps them over a reset"
+        ));
         Ok(())
     }
 }

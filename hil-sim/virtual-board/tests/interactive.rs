@@ -311,9 +311,13 @@ fn the_console_program_understands_the_image() {
     }
     let file = folder.join("settings.txt").display().to_string();
     let restore = format!("!restore {file}");
-    std::fs::write(&file, "set command.timeout_s 77\nset command.timeout_s soon\n").unwrap();
+    let lines = "set command.timeout_s soon\nset command.timeout_s 77\napply\n";
+    std::fs::write(&file, lines).unwrap();
     let why = session.enter(&restore, |_| ()).unwrap_err().to_string();
-    assert!(why.contains("settings.txt, line 2: `set command.timeout_s soon`: error:"), "{why}");
+    assert!(why.contains("settings.txt, line 1: `set command.timeout_s soon`: error:"), "{why}");
+    let Flow::Refused(why) = session.enter("start vf", |_| ()).unwrap() else { panic!("a start") };
+    assert!(why.contains("lines of the backup that were refused: 1; `apply rest`"), "{why}");
+    assert_eq!(session.enter("apply rest", |_| ()).unwrap(), Flow::Next);
     let mut said = Vec::new();
     session.enter("get command.timeout_s", |line| said.push(line.to_owned())).unwrap();
     assert!(said[0].starts_with("command.timeout_s = 77"), "{said:?}");

@@ -86,7 +86,8 @@ commands! { words;
         word => Request::List(ListKind::Describe(word.map_or(Ok(""), prefix)?)),
     };
     17: "set", ["KEY VALUE ...", "stage values, several in a line; the drive must be off"] => Request::Set(assignments(words)?);
-    18: "apply", ["", "put the staged values into force; start does so, too"] => Order::Apply;
+    18: "apply", ["[rest]", "put the staged values into force; start does so, too; rest: although lines of a backup were refused"]
+        => if words.flag("rest")? { Order::ApplyRest } else { Order::Apply };
     19: "revert", ["", "drop the staged values"] => Order::Revert;
     20: "save", ["", "apply, then keep settings and learned values over a reset"] => Order::Save;
     21: "defaults", ["", "stage the settings of the image"] => Order::Defaults;
@@ -132,10 +133,7 @@ commands! { words;
     )?;
     33: "board", ["[NAME]", "the board and what is assumed; NAME: the next lines are for that board only"] => match words.optional() {
         None => Request::List(ListKind::Board),
-        Some(word) => {
-            let one_of = ParseError::OneOf { what: "the board", word, all: boards::ALL_NAMES };
-            Order::BoardIs(boards::find(word).ok_or(one_of)?).into()
-        }
+        Some(name) => Order::BoardIs(boards::find(name)).into(),
     };
     34: "confirm", ["board", "the bench steps of the board are done: allow to start, and save"] => words.one_of("what to confirm", "board", &[("board", Order::Confirm)])?;
     35: "version", ["", "which firmware this is"] => Request::Version;
