@@ -1,15 +1,8 @@
-//! Numbers of the chip and of the Nucleo board, once, and the settings of the power stage that the firmware is built
+//! Numbers of the chip, once, and the settings of the power stage that the firmware is built
 //! for.
 //!
 //! Pins, polarities, sensors and limits of the power stages are in [`boards`](crate::boards). Derived numbers are
 //! computed here; relations between numbers are asserted when compiling. The file is long because every number says why.
-//!
-//! | pin of every board | signal | peripheral |
-//! |---|---|---|
-//! | PA15, PB3 | encoder A, B | TIM2_CH1, CH2 |
-//! | PA2, PA3 | console: transmit, receive (the ST-LINK's serial port) | LPUART1 |
-//! | PC6 | brake chopper | TIM8_CH1 |
-//! | PC8 | precharge relay | |
 
 mod dead_time;
 mod flash;
@@ -21,13 +14,10 @@ use drive_core::io::PERIOD_S;
 use drive_settings::{Carrier, CurrentSensors, Inverter, Scales, Sequence, Settings};
 
 use crate::boards::converter::REFERENCE_V;
-use crate::boards::pin::{self, Pin, pc};
 use crate::boards::{Board, Currents, SELECTED, Shunts};
 
 // Clock ---------------------------------------------------------------------------------------
 
-/// Crystal of the Nucleo board, Hz.
-pub const HSE_HZ: u32 = 24_000_000;
 /// Longest wait for the crystal to start, ms: typically 2 ms (datasheet), with a wide margin. After it
 /// the internal oscillator is used.
 pub const HSE_START_MS: u32 = 100;
@@ -316,8 +306,13 @@ pub fn protection(board: &Board, settings: &Settings) -> Protection {
     }
 }
 
-/// The INMSEL field of COMP1_CSR: DAC3, channel 1 (RM0440, comparator inverting inputs).
-pub const COMP1_INVERTING_DAC3: u8 = 0b100;
+/// The comparator of the dc link, COMP1 (0) or COMP3 (1), and its INPSEL field.
+pub const COMPARATOR: (u8, u8) =
+    SELECTED.dc_link.pin.comparator().expect("a comparator reaches the dc link");
+/// Address of its register CSR (RM0440, memory map).
+pub const COMPARATOR_CSR: u32 = 0x4001_0200 + 8 * COMPARATOR.0 as u32;
+/// The INMSEL field of COMP1_CSR and COMP3_CSR: DAC3, channel 1 (RM0440, comparator inverting inputs).
+pub const COMP_INVERTING_DAC3: u8 = 0b100;
 /// The HYST field: 10 mV, which is 1.4 V of the dc link.
 pub const COMP_HYSTERESIS: u8 = 1;
 /// Settling time of the level, us (datasheet: 8 at most to wake up, unbuffered).
@@ -330,26 +325,14 @@ pub const LIFT_US: u32 = 5000;
 /// ADC counts of the dc link, a tenth of the range, above which the comparator of the dc link can be tested with the dc link itself.
 pub const COMPARABLE: u16 = 410;
 
-// Dc link ---------------------------------------------------------------------------------------
-
-/// Output for the brake chopper, on at a high level. It needs an external pull-down: it floats in reset.
-pub const CHOPPER: Pin = pc(6);
-const _: () = assert!(CHOPPER.is(&pin::TIM8_CH1));
-/// Output for the precharge relay, on at a high level, with a pull-down as well.
-pub const RELAY: Pin = pc(8);
-
 // Encoder -------------------------------------------------------------------------------------
 
-/// Alternate function of the pins that belong to TIM2 (datasheet).
-pub const ENCODER_AF: u8 = 1;
 /// The ICxF field of TIM2: six samples at an eighth of the clock, so shorter pulses than 282 ns are ignored.
 /// 10 000 counts a turn at 1440 rpm come every 4.2 us.
 pub const ENCODER_FILTER: u8 = 0b1000;
 
 // Console -------------------------------------------------------------------------------------
 
-/// Alternate function of the pins that belong to LPUART1 (datasheet).
-pub const SERIAL_AF: u8 = 12;
 /// Bits per second after a reset; 8 data bits, no parity, 1 stop bit.
 pub const SERIAL_BAUD: u32 = 115_200;
 /// Highest rate that `baud` takes, bits per second: a byte is 850 core cycles, so that the FIFO of eight bytes outlasts the

@@ -14,35 +14,39 @@ mod tests;
 
 mod nucleo_g474re_ihm023v3;
 mod nucleo_g474re_ihm08m1;
+mod nucleo_g474re_ipm10b;
 mod nucleo_g474re_ipmm10b;
+#[path = "../tests/boards/own_board.rs"]
+mod own_board;
 mod reference;
 
 use drive_core::Line;
 use drive_settings::rules::dc_link::{HIGHEST_OF_NOMINAL, OVER_OF_HIGHEST};
 use drive_settings::{Carrier, Flux, Ntc};
 
-use pin::Pin;
+use pin::{Pin, pa, pb, pc};
 
 /// All boards.
-pub const ALL: [&Board; 4] = [
+pub const ALL: [&Board; 6] = [
     &reference::BOARD,
     &nucleo_g474re_ihm08m1::BOARD,
     &nucleo_g474re_ihm023v3::BOARD,
     &nucleo_g474re_ipmm10b::BOARD,
+    &nucleo_g474re_ipm10b::BOARD,
+    &own_board::BOARD,
 ];
 
 /// Their names.
-pub const NAMES: [&str; ALL.len()] = [ALL[0].name, ALL[1].name, ALL[2].name, ALL[3].name];
+pub const NAMES: [&str; ALL.len()] =
+    [ALL[0].name, ALL[1].name, ALL[2].name, ALL[3].name, ALL[4].name, ALL[5].name];
 /// Their names in a line.
-pub const ALL_NAMES: &str =
-    "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3 nucleo-g474re-ipmm10b";
+pub const ALL_NAMES: &str = "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3 nucleo-g474re-ipmm10b nucleo-g474re-ipm10b own-board";
 
 /// The board that this firmware is built for: `cargo firmware --board NAME`, by default the reference.
 pub const SELECTED: &Board = match option_env!("INDUCTION_DRIVE_BOARD") {
-    Some(name) => match find(name) {
-        Some(board) => board,
-        None => panic!("INDUCTION_DRIVE_BOARD: no such board; src/boards.rs lists them"),
-    },
+    Some(name) => {
+        find(name).expect("INDUCTION_DRIVE_BOARD: no such board; src/boards.rs lists them")
+    }
     None => &reference::BOARD,
 };
 
@@ -50,21 +54,12 @@ pub const SELECTED: &Board = match option_env!("INDUCTION_DRIVE_BOARD") {
 pub const fn find(name: &str) -> Option<&'static Board> {
     let mut i = 0;
     while i < ALL.len() {
-        if same(ALL[i].name.as_bytes(), name.as_bytes()) {
+        if ALL[i].name.eq_ignore_ascii_case(name) {
             return Some(ALL[i]);
         }
         i += 1;
     }
     None
-}
-
-/// Equality of two texts when compiling, where `==` is not available.
-const fn same(a: &[u8], b: &[u8]) -> bool {
-    let mut i = 0;
-    while i < a.len() && i < b.len() && a[i] == b[i] {
-        i += 1;
-    }
-    i == a.len() && i == b.len()
 }
 
 /// A value with its source.
@@ -181,7 +176,22 @@ pub struct Shunts {
     pub settle_s: Stated<f32>,
 }
 
-/// A board: a NUCLEO-G474RE with its power stage.
+/// The connections of the chip that do not belong to the power stage. [`morpho::NUCLEO`] are those of a NUCLEO-G474RE.
+#[derive(Clone, Copy, Debug)]
+pub struct Wiring {
+    /// The crystal, Hz.
+    pub crystal_hz: u32,
+    /// Transmit and receive of the console, LPUART1.
+    pub console: [Pin; 2],
+    /// Tracks A and B of the encoder, channels 1 and 2 of TIM2.
+    pub encoder: [Pin; 2],
+    /// Output for the brake chopper, channel 1 of TIM8, on at a high level. It needs an external pull-down: it floats in reset.
+    pub chopper: Pin,
+    /// Output for the precharge relay, on at a high level, with a pull-down as well.
+    pub relay: Pin,
+}
+
+/// A board: an STM32G474RE, for example on a NUCLEO-G474RE, with its power stage.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
     /// Name at the command line and in saved settings.
@@ -204,7 +214,7 @@ pub struct Board {
     pub currents: Currents,
     /// Delay of the analog filters of the currents, s.
     pub current_delay_s: Stated<f32>,
-    /// Dc link. Its pin is the input of comparator 1.
+    /// Dc link. Its pin is an input of comparator 1 or 3.
     pub dc_link: Analog,
     /// Pin of the heat sink's thermistor.
     pub heat_sink: Pin,
@@ -225,6 +235,8 @@ pub struct Board {
     pub bus: Option<Rs485>,
     /// The terminals, on pins that the power stage leaves free.
     pub terminals: Terminals,
+    /// Crystal, console, encoder, chopper and relay.
+    pub wiring: Wiring,
     /// Advice on resistors at the driver inputs, one sentence: the pins float while the chip is in reset or flashed.
     pub pulls: &'static str,
 }
@@ -291,24 +303,24 @@ impl Board {
         ((self.dc_link_limits.operation.value - offset) / gain) as u16 + 1
     }
 
-    /// Whether the pin belongs to a signal of the board.
-    const fn uses(&self, pin: Pin) -> bool {
-        self.uses_beside_terminals(pin) || pin.is_one_of(&self.terminals.pins)
-    }
-
-    const fn uses_beside_terminals(&self, pin: Pin) -> bool {
+    /// Number of signals at a pin. The debug port and a pin that must stay analog count as signals.
+    const fn signals_at(&self, pin: Pin) -> usize {
         let Currents { a, b, shunts } = self.currents;
         let c = match shunts {
-            Some(Shunts { c, .. }) => c,
-            None => b,
+            Some(Shunts { c, .. }) => pin.times(&[c.pin]),
+            None => 0,
         };
         let bus = match self.bus {
-            Some(Rs485 { transmit, receive, driver }) => [transmit, receive, driver],
-            None => [a.pin; 3],
+            Some(Rs485 { transmit, receive, driver }) => pin.times(&[transmit, receive, driver]),
+            None => 0,
         };
-        let inputs = [self.fault.pin, a.pin, b.pin, c.pin, self.dc_link.pin, self.heat_sink];
-        let gates = pin.is_among(&self.high.pins) || pin.is_among(&self.low.pins);
-        gates || pin.is_among(&inputs) || pin.is_among(&bus) || pin.is_among(&pin::FIXED)
+        let gates = pin.times(&self.high.pins) + pin.times(&self.low.pins);
+        let Wiring { console, encoder, chopper, relay, .. } = self.wiring;
+        let inputs = [self.fault.pin, a.pin, b.pin, self.dc_link.pin, self.heat_sink];
+        let wires = pin.times(&console) + pin.times(&encoder);
+        let single = pin.times(&inputs) + pin.times(&[chopper, relay, pa(13), pa(14)]);
+        let others = pin.times(self.analog_only) + pin.times_of_some(&self.terminals.pins);
+        gates + c + bus + wires + single + others
     }
 }
 
@@ -329,14 +341,13 @@ const fn check(board: &Board) {
         assert!(board.low.pins[leg].is(complementary), "a low side is not on its leg's channel");
         leg += 1;
     }
-    assert!(board.fault.pin.is(&pin::TIM1_BKIN), "the fault input is not a break input");
+    assert!(board.fault.pin.is(pin::TIM1_BKIN), "the fault input is not a break input");
     let Currents { a, b, shunts } = board.currents;
     assert!(a.pin.adc1().is_some() && b.pin.adc2().is_some(), "a current has no ADC");
     if let Some(Shunts { c, .. }) = shunts {
         assert!(c.pin.adc1().is_some(), "current c has no ADC");
-        assert!(!c.pin.equals(a.pin) && !c.pin.equals(b.pin), "two currents on one pin");
     }
-    assert!(board.dc_link.pin.equals(pin::COMP1_INPUT), "comparator 1 does not reach the dc link");
+    assert!(board.dc_link.pin.comparator().is_some(), "no comparator reaches the dc link");
     assert!(board.dc_link.pin.adc1().is_some() && board.heat_sink.adc2().is_some());
     let (own, longest) = (board.dead_time_s.value, board.dead_time_max_s);
     assert!(own > 0.0 && own <= longest && longest <= 6e-6, "dead time");
@@ -344,29 +355,29 @@ const fn check(board: &Board) {
         CHIP_PULL_OHM / (CHIP_PULL_OHM + board.fault.pull_ohm.value) >= SURE_LEVEL,
         "the resistor at the fault input is too large: the chip pulls against it"
     );
-    let mut i = 0;
-    while i < board.analog_only.len() {
-        assert!(!board.uses(board.analog_only[i]), "a pin that must stay analog has a signal");
-        i += 1;
-    }
-    if let Some(Rs485 { transmit, receive, driver }) = board.bus {
-        assert!(
-            transmit.is(&pin::USART3_TX) && receive.is(&pin::USART3_RX),
-            "a pin of the bus is not one of USART3"
-        );
-        assert!(
-            !driver.equals(transmit) && !driver.equals(receive),
-            "two wires of the bus on one pin"
-        );
+    let Wiring { console: [tx, rx], encoder: [a, b], chopper, .. } = board.wiring;
+    assert!(tx.is(pin::LPUART1_TX) && rx.is(pin::LPUART1_RX), "the console is not at LPUART1");
+    assert!(a.is(pin::TIM2_CH1) && b.is(pin::TIM2_CH2), "the encoder is not at TIM2");
+    assert!(chopper.is(pin::TIM8_CH1), "the chopper is not at channel 1 of TIM8");
+    if let Some(Rs485 { transmit: tx, receive: rx, .. }) = board.bus {
+        assert!(tx.is(pin::USART3_TX) && rx.is(pin::USART3_RX), "the bus is not at USART3");
     }
     let mut i = 0;
     while i < TERMINALS.len() {
         if let Some(pin) = board.terminals.pins[i] {
-            let others = board.terminals.pins.split_at(i + 1).1;
-            let free = !board.uses_beside_terminals(pin) && !pin.is_one_of(others);
-            assert!(free, "a terminal has the pin of another signal");
             assert!(i >= ANALOG || pin.adc34().is_some(), "a terminal has no ADC");
         }
+        i += 1;
+    }
+    let mut i = 0;
+    while i < 16 {
+        let most_is_one = board.signals_at(pa(i)) <= 1
+            && board.signals_at(pb(i)) <= 1
+            && board.signals_at(pc(i)) <= 1;
+        assert!(
+            most_is_one,
+            "two signals have the same pin, or a pin that must stay analog has one"
+        );
         i += 1;
     }
     // Nominal dc link < braking limit <= maximum operating voltage < trip of the software < trip of the comparator <= voltages that

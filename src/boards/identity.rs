@@ -26,12 +26,9 @@ pub struct Identity {
 impl Identity {
     /// The identity of a board.
     pub const fn of(board: &Board) -> Self {
-        let (bytes, mut name, mut i) = (board.name.as_bytes(), [0; NAME], 0);
+        let (bytes, mut name) = (board.name.as_bytes(), [0; NAME]);
         assert!(bytes.len() < NAME, "the board's name is too long");
-        while i < bytes.len() {
-            name[i] = bytes[i];
-            i += 1;
-        }
+        name.split_at_mut(bytes.len()).0.copy_from_slice(bytes);
         let high = matches!(board.high.on_at.value, Level::High) as u32;
         let low = matches!(board.low.on_at.value, Level::High) as u32;
         let [a, b, c] = board.high.pins;

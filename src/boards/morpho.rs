@@ -6,7 +6,7 @@ use drive_settings::Ntc;
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{Pin, pa, pb, pc};
-use super::{Analog, Currents, FaultInput, Gates, Level, Rs485, Shunts, Stated, assumed};
+use super::{Analog, Currents, FaultInput, Gates, Level, Rs485, Shunts, Stated, Wiring, assumed};
 
 /// Low sides.
 pub const LOW: [Pin; 3] = [pa(7), pb(0), pb(1)];
@@ -16,6 +16,15 @@ pub const CURRENTS: [Pin; 3] = [pa(0), pc(1), pc(0)];
 pub const HEAT_SINK: Pin = pc(2);
 /// The port of the field bus: three pins beside each other on CN7, which the boards here do not use.
 pub const BUS: Rs485 = Rs485 { transmit: pc(10), receive: pc(11), driver: pc(12) };
+
+/// The connections of a NUCLEO-G474RE. The console is the ST-LINK's serial port.
+pub const NUCLEO: Wiring = Wiring {
+    crystal_hz: 24_000_000,
+    console: [pa(2), pa(3)],
+    encoder: [pa(15), pb(3)],
+    chopper: pc(6),
+    relay: pc(8),
+};
 
 /// Bench step of a shunt.
 pub const SHUNT_STEP: &str =
@@ -38,14 +47,14 @@ pub const fn ntc(divider_ohm: f32) -> Stated<Ntc> {
     assumed(Ntc { divider_ohm, ..Ntc::DEFAULT }, NTC_STEP)
 }
 
-/// A fault output that pulls PA6 low, and its pull-up.
+/// A fault output that pulls the fault input low, and its pull-up.
 pub const fn fault(bench_step: &'static str) -> FaultInput {
     FaultInput {
         pin: pa(6),
         trips_at: assumed(Level::Low, bench_step),
         pull_ohm: assumed(
             4.7e3,
-            "firmware running, no fault: at least 2.6 V at PA6; otherwise 4.7 kOhm from PA6 to 3.3 V",
+            "firmware running, no fault: at least 2.6 V at the fault input; otherwise 4.7 kOhm from it to 3.3 V",
         ),
     }
 }

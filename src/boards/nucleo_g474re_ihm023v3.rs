@@ -52,5 +52,6 @@ pub const BOARD: Board = Board {
     // Whether the adapter leaves pins of USART3 free is not known.
     bus: None,
     terminals: Terminals::NONE,
+    wiring: morpho::NUCLEO,
     pulls: morpho::PULLS,
 };

@@ -59,5 +59,6 @@ pub const BOARD: Board = Board {
     analog_only: &[pa(11), pb(14), pb(15)],
     bus: Some(morpho::BUS),
     terminals: Terminals::of(TERMINALS),
+    wiring: morpho::NUCLEO,
     pulls: morpho::PULLS,
 };

@@ -1,5 +1,7 @@
-//! Pins of the STM32G474RE, and the peripheral signals that each pin can carry (datasheet, alternate functions and pin description; the
-//! same as in the tables of `stm32g4xx-hal` 0.1.0).
+//! Pins of the STM32G474RE, and the peripheral signals that each pin can carry.
+//!
+//! After a reset some pins have a resistor of the chip until the firmware sets them up, which a circuit there has to withstand: PB4 and
+//! PB6 a pull-down of 5.1 kOhm (dead battery, USB-C), PA15 and PB4 a pull-up of about 40 kOhm (debug port).
 
 /// A port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,40 +38,16 @@ pub const fn pc(number: u8) -> Pin {
     Pin { port: Port::C, number }
 }
 
-/// A pin and the number of the alternate function that connects it.
+/// A pin and the number by which a peripheral selects it: the alternate function, the channel of an ADC, or the input of a comparator.
 pub type Reach = (Pin, u8);
+/// A pin, which of two peripherals reaches it (0 or 1), and its number there.
+pub type ReachOfTwo = (Pin, (u8, u8));
+
+include!("reach.in");
 
 /// Outputs of channels 1 to 3 of TIM1, each with its complementary output.
-pub const TIM1_LEGS: [(&[Reach], &[Reach]); 3] = [
-    (&[(pa(8), 6), (pc(0), 2)], &[(pa(7), 6), (pa(11), 6), (pb(13), 6), (pc(13), 4)]),
-    (&[(pa(9), 6), (pc(1), 2)], &[(pa(12), 6), (pb(0), 6), (pb(14), 6)]),
-    (&[(pa(10), 6), (pc(2), 2)], &[(pb(1), 6), (pb(9), 12), (pb(15), 4)]),
-];
-/// Break input of TIM1.
-pub const TIM1_BKIN: [Reach; 6] =
-    [(pa(6), 6), (pa(14), 6), (pb(8), 12), (pb(10), 12), (pb(12), 6), (pc(13), 2)];
-/// Output of USART3.
-pub const USART3_TX: [Reach; 3] = [(pb(9), 7), (pb(10), 7), (pc(10), 7)];
-/// Input of USART3.
-pub const USART3_RX: [Reach; 3] = [(pb(8), 7), (pb(11), 7), (pc(11), 7)];
-/// Output of channel 1 of TIM8.
-pub const TIM8_CH1: [Reach; 3] = [(pa(15), 2), (pb(6), 5), (pc(6), 4)];
-/// Pins of every board: encoder, console, brake chopper, precharge relay, debug port.
-pub const FIXED: [Pin; 8] = [pa(15), pb(3), pa(2), pa(3), pc(6), pc(8), pa(13), pa(14)];
-/// Positive input of comparator 1.
-pub const COMP1_INPUT: Pin = pa(1);
-
-/// Channels of ADC1 and ADC2 that reach the same pin: `(pin, channel)`. All are among channels 1 to 9.
-const ADC12: [(Pin, u8); 6] =
-    [(pa(0), 1), (pa(1), 2), (pc(0), 6), (pc(1), 7), (pc(2), 8), (pc(3), 9)];
-/// Channels of ADC1 only.
-const ADC1: [(Pin, u8); 2] = [(pa(2), 3), (pa(3), 4)];
-/// Channels of ADC2 only.
-const ADC2: [(Pin, u8); 3] = [(pa(6), 3), (pa(7), 4), (pa(5), 13)];
-
-/// Channels of ADC3 (0) and ADC4 (1): `(pin, (ADC, channel))`.
-const ADC34: [(Pin, (u8, u8)); 4] =
-    [(pb(13), (0, 5)), (pb(12), (1, 3)), (pb(14), (1, 4)), (pb(15), (1, 5))];
+pub const TIM1_LEGS: [(&[Reach], &[Reach]); 3] =
+    [(TIM1_CH1, TIM1_CH1N), (TIM1_CH2, TIM1_CH2N), (TIM1_CH3, TIM1_CH3N)];
 
 const fn look_up<T: Copy>(table: &[(Pin, T)], pin: Pin) -> Option<T> {
     let mut i = 0;
@@ -88,20 +66,20 @@ impl Pin {
         self.port as u8 == other.port as u8 && self.number == other.number
     }
 
-    /// Whether the pin is one of these, some of which may be `None`.
-    pub const fn is_one_of(self, pins: &[Option<Self>]) -> bool {
+    /// How many of these pins it is.
+    pub const fn times(self, pins: &[Self]) -> usize {
         match pins {
-            [] => false,
-            [Some(first), ..] if first.equals(self) => true,
-            [_, others @ ..] => self.is_one_of(others),
+            [] => 0,
+            [first, others @ ..] => first.equals(self) as usize + self.times(others),
         }
     }
 
-    /// Whether the pin is one of these.
-    pub const fn is_among(self, pins: &[Self]) -> bool {
+    /// How many of these pins it is, some of which may be `None`.
+    pub const fn times_of_some(self, pins: &[Option<Self>]) -> usize {
         match pins {
-            [] => false,
-            [first, others @ ..] => first.equals(self) || self.is_among(others),
+            [] => 0,
+            [Some(first), others @ ..] => first.equals(self) as usize + self.times_of_some(others),
+            [None, others @ ..] => self.times_of_some(others),
         }
     }
 
@@ -120,23 +98,22 @@ impl Pin {
 
     /// Channel of the pin at ADC1.
     pub const fn adc1(self) -> Option<u8> {
-        match look_up(&ADC12, self) {
-            Some(channel) => Some(channel),
-            None => look_up(&ADC1, self),
-        }
-    }
-
-    /// ADC of the pin, ADC3 (0) or ADC4 (1), and its channel there.
-    pub const fn adc34(self) -> Option<(u8, u8)> {
-        look_up(&ADC34, self)
+        look_up(ADC1, self)
     }
 
     /// Channel of the pin at ADC2.
     pub const fn adc2(self) -> Option<u8> {
-        match look_up(&ADC12, self) {
-            Some(channel) => Some(channel),
-            None => look_up(&ADC2, self),
-        }
+        look_up(ADC2, self)
+    }
+
+    /// ADC of the pin, ADC3 (0) or ADC4 (1), and its channel there.
+    pub const fn adc34(self) -> Option<(u8, u8)> {
+        look_up(ADC34, self)
+    }
+
+    /// Comparator of the pin, COMP1 (0) or COMP3 (1), and its input there. Both can be compared with channel 1 of DAC3.
+    pub const fn comparator(self) -> Option<(u8, u8)> {
+        look_up(COMP13, self)
     }
 }
 

@@ -67,5 +67,6 @@ pub const BOARD: Board = Board {
     bus: Some(morpho::BUS),
     // PB4 and PB6 have the pull-downs of USB-C after a reset, PB8 selects the program that starts.
     terminals: Terminals::of(TERMINALS),
+    wiring: morpho::NUCLEO,
     pulls: "pull-down resistors of 10 kOhm at all six driver inputs",
 };

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::{
     ALL, Board, COMPARATOR_ERROR, Currents, Level, OF_SWITCHES, SENSING_ERROR, Source, check,
     identity::Identity,
-    morpho, pin,
+    pin,
     pin::{Pin, Port},
 };
 use crate::board::{protection, settings_of};
@@ -197,7 +197,7 @@ fn a_board_that_cannot_be_protected_does_not_compile() {
         let mut other = *board;
         other.fault.pull_ohm.value = 10e3;
         assert!(refused(other).contains("the chip pulls against it"));
-        for pin in [morpho::LOW[1], board.fault.pin, board.heat_sink, pin::FIXED[4]] {
+        for pin in [board.low.pins[1], board.fault.pin, board.heat_sink, board.wiring.chopper] {
             let mut other = *board;
             other.analog_only = Box::leak(Box::new([pin]));
             assert!(refused(other).contains("must stay analog"), "{pin}");
@@ -212,7 +212,23 @@ fn a_board_that_cannot_be_protected_does_not_compile() {
     }
     let mut other = *ALL[0];
     other.terminals.pins[0] = other.terminals.pins[1];
-    assert!(refused(other).contains("a terminal has the pin of another signal"));
+    assert!(refused(other).contains("two signals have the same pin"));
+    // Each signal of the chip at a pin that it does not reach, or that has a signal.
+    type Move = (fn(&mut Board), &'static str);
+    let moves: [Move; 7] = [
+        (|board| board.wiring.console[1] = pin::pa(2), "the console is not at LPUART1"),
+        (|board| board.wiring.encoder[0] = pin::pb(3), "the encoder is not at TIM2"),
+        (|board| board.wiring.encoder[0] = pin::pa(0), "two signals have the same pin"),
+        (|board| board.wiring.chopper = pin::pc(8), "the chopper is not at channel 1 of TIM8"),
+        (|board| board.wiring.relay = pin::pa(13), "two signals have the same pin"),
+        (|board| board.heat_sink = board.dc_link.pin, "two signals have the same pin"),
+        (|board| board.dc_link.pin = pin::pc(3), "no comparator reaches the dc link"),
+    ];
+    for (move_pin, why) in moves {
+        let mut other = *ALL[0];
+        move_pin(&mut other);
+        assert!(refused(other).contains(why), "{why}");
+    }
     // As this board was once: its link up to the absolute maximum of its transistors.
     let mut old = *ALL[1];
     (old.dc_link_v, old.dc_link_limits.operation.value) = (48.0, 58.5);

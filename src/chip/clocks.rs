@@ -10,6 +10,7 @@ use stm32g4xx_hal::time::RateExtU32;
 
 use super::StartError;
 use crate::board;
+use crate::boards::SELECTED;
 
 /// Source of the core's clock.
 #[derive(Clone, Copy, PartialEq, Eq, defmt::Format)]
@@ -22,7 +23,12 @@ pub enum Source {
 
 // Both oscillators are divided to 4 MHz, multiplied to 340 MHz and halved: inside what the PLL
 // allows (input 2.66 to 16 MHz, oscillator 96 to 344 MHz).
-const CRYSTAL_DIVIDER: PllMDiv = PllMDiv::DIV_6;
+const CRYSTAL_DIVIDER: PllMDiv = match SELECTED.wiring.crystal_hz {
+    8_000_000 => PllMDiv::DIV_2,
+    16_000_000 => PllMDiv::DIV_4,
+    24_000_000 => PllMDiv::DIV_6,
+    _ => panic!("wiring.crystal_hz: 8, 16 or 24 MHz are possible"),
+};
 const INTERNAL_DIVIDER: PllMDiv = PllMDiv::DIV_4;
 const MULTIPLIER: PllNMul = PllNMul::MUL_85;
 const OUTPUT_DIVIDER: PllRDiv = PllRDiv::DIV_2;
@@ -33,7 +39,7 @@ const PLL_START_MS: u32 = 2;
 const fn pll_hz(oscillator_hz: u32, divider: PllMDiv) -> u32 {
     oscillator_hz / divider.divisor() * MULTIPLIER.multiplier() / OUTPUT_DIVIDER.divisor()
 }
-const _: () = assert!(pll_hz(board::HSE_HZ, CRYSTAL_DIVIDER) == board::CLOCK_HZ);
+const _: () = assert!(pll_hz(SELECTED.wiring.crystal_hz, CRYSTAL_DIVIDER) == board::CLOCK_HZ);
 const _: () = assert!(pll_hz(board::HSI_HZ, INTERNAL_DIVIDER) == board::CLOCK_HZ);
 
 /// Switches on the clock of a peripheral, and waits two bus cycles until the peripheral can be accessed (ST reads the enable register
@@ -60,7 +66,7 @@ pub fn start(
     // The range without boost, from which the HAL takes the steps to 170 MHz. A reset may have kept the boost.
     pwr.cr5().modify(|_, w| w.r1mode().set_bit());
     let (source, mux, divider) = if crystal_starts(&rcc) {
-        (Source::Crystal, PllSrc::HSE(board::HSE_HZ.Hz()), CRYSTAL_DIVIDER)
+        (Source::Crystal, PllSrc::HSE(SELECTED.wiring.crystal_hz.Hz()), CRYSTAL_DIVIDER)
     } else {
         rcc.cr().modify(|_, w| w.hseon().off());
         (Source::Internal, PllSrc::HSI, INTERNAL_DIVIDER)

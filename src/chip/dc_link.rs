@@ -2,7 +2,7 @@
 //!
 //! TIM8 generates the chopper's pulses, one per control period (with 12 and 18 kHz one less in 2.4 s, because its period is fixed); the
 //! relay is a plain output. A high level switches either on. A reset releases both pins, so external resistors pull them down
-//! ([`board::CHOPPER`], [`board::RELAY`]). The break of TIM8 switches the chopper off without software if the core locks up, or the
+//! ([`Wiring`](crate::boards::Wiring)). The break of TIM8 switches the chopper off without software if the core locks up, or the
 //! supply or the flash fails.
 
 use stm32g4xx_hal::pac;
@@ -11,8 +11,11 @@ use stm32g4xx_hal::rcc::Rcc;
 use super::clocks::clock_on;
 use super::{StartError, pins};
 use crate::board;
-use crate::boards::{Level, pin};
+use crate::boards::pin::Pin;
+use crate::boards::{Level, SELECTED, pin};
 
+const CHOPPER: Pin = SELECTED.wiring.chopper;
+const RELAY: Pin = SELECTED.wiring.relay;
 /// Ticks of a control period with one pulse.
 const PERIOD: u16 = 2 * board::PWM_TOP;
 
@@ -42,8 +45,8 @@ impl DcLink {
         });
         timer.egr().write(|w| w.ug().update());
         timer.cr1().write(|w| w.arpe().enabled().cen().enabled());
-        pins::alternate(board::CHOPPER, board::CHOPPER.function(&pin::TIM8_CH1), Some(Level::Low));
-        pins::output(board::RELAY, Level::Low);
+        pins::alternate(CHOPPER, CHOPPER.function(pin::TIM8_CH1), Some(Level::Low));
+        pins::output(RELAY, Level::Low);
         Ok(Self { timer })
     }
 
@@ -61,7 +64,7 @@ impl DcLink {
     pub fn set(&mut self, duty: f32, relay: bool) {
         // The cast saturates.
         self.timer.ccr1().write(|w| w.ccr().set((duty * f32::from(PERIOD)) as u32));
-        pins::set(board::RELAY, if relay { Level::High } else { Level::Low });
+        pins::set(RELAY, if relay { Level::High } else { Level::Low });
     }
 }
 
@@ -71,5 +74,5 @@ pub fn outputs_off() {
     // sets MOE again only with the drive off, at the duty zero.
     let timer = unsafe { &*pac::TIM8::ptr() };
     timer.bdtr().modify(|_, w| w.moe().disabled_idle());
-    pins::set(board::RELAY, Level::Low);
+    pins::set(RELAY, Level::Low);
 }

@@ -9,7 +9,7 @@ use stm32g4xx_hal::rcc::Rcc;
 use super::clocks::clock_on;
 use super::{StartError, pins};
 use crate::board;
-use crate::boards::pin::{pa, pb};
+use crate::boards::{SELECTED, pin};
 
 /// The counter of the encoder.
 pub struct Encoder {
@@ -17,17 +17,16 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Starts counting from 0. Track A is PA15, track B is PB3; A leads when the rotor turns from
-    /// phase a towards phase b.
+    /// Starts counting from 0. Track A leads when the rotor turns from phase a towards phase b.
     ///
-    /// Both pins belong to JTAG after reset; the two-wire debug port does not need them.
+    /// PA15 and PB3 belong to JTAG after reset; the two-wire debug port does not need them.
     pub fn new(timer: pac::TIM2, rcc: &mut Rcc) -> Result<Self, StartError> {
         clock_on!(rcc.apb1enr1(), tim2en, "TIM2")?;
         // No resistors of the chip: with them, the pins do not withstand the 5 V of a push-pull encoder (AN4899), and 40 kOhm are too
         // slow for an open collector. An open collector needs an external resistor of 1 to 4.7 kOhm to 3.3 V.
-        for track in [pa(15), pb(3)] {
-            pins::alternate(track, board::ENCODER_AF, None);
-        }
+        let [a, b] = SELECTED.wiring.encoder;
+        pins::alternate(a, a.function(pin::TIM2_CH1), None);
+        pins::alternate(b, b.function(pin::TIM2_CH2), None);
 
         timer.ccmr1_input().write(|w| {
             w.cc1s().ti1().ic1f().set(board::ENCODER_FILTER);

@@ -1,7 +1,8 @@
-//! Over-voltage protection without software: comparator 1 compares the pin of the dc link with a level from DAC3,
+//! Over-voltage protection without software: comparator 1 or 3 compares the pin of the dc link with a level from DAC3,
 //! channel 1, inside the chip, and pulls the break of TIM1 (`pwm.rs`).
 //!
-//! The dc link is the only measured signal with a comparator of its own: the pins of both currents reach comparator 3 only.
+//! On the connector of ST the dc link is the only measured signal with a comparator of its own: the pins of both currents reach comparator
+//! 3 only.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -20,6 +21,11 @@ static PROVED: AtomicBool = AtomicBool::new(false);
 /// Reason why no motor is switched on before the comparator has tripped.
 pub const UNPROVED: StartError = "self-test: the over-voltage comparator does not trip at the level zero; with a sensor that drives its pin: dc link above a tenth of the range first";
 
+/// The register of the comparator.
+fn csr(comparators: &pac::comp::RegisterBlock) -> &pac::comp::CCSR {
+    comparators.ccsr(2 * usize::from(board::COMPARATOR.0))
+}
+
 /// Starts the comparator and locks it at `level`, in ADC counts, until the next reset. Proves before that it pulls the break of the
 /// timer, and that it does not at `level`. The outputs are off. The comparator has to trip at the level zero as well; if a sensor drives
 /// the pin to ground against the chip's resistor, [`prove`] shows that later with a dc link.
@@ -34,7 +40,7 @@ pub fn watch(
     level: u16,
 ) -> Result<(), StartError> {
     clock_on!(rcc.ahb2enr(), dac3en, "self-test: DAC3")?;
-    clock_on!(rcc.apb2enr(), syscfgen, "self-test: COMP1")?;
+    clock_on!(rcc.apb2enr(), syscfgen, "self-test: comparator")?;
     let set = |code: u16| {
         dac.dhr12r1().write(|w| w.daccdhr().set(code));
         asm::delay(board::DAC_START_US * board::CYCLES_PER_US);
@@ -53,18 +59,18 @@ pub fn watch(
         return Err("self-test: DAC3 is not ready");
     }
 
-    comparators.c1csr().write(|w| {
+    let csr = csr(comparators);
+    csr.write(|w| {
         // SAFETY: three bits each; `board` keeps both inside.
         unsafe {
-            w.inmsel().bits(board::COMP1_INVERTING_DAC3);
+            w.inmsel().bits(board::COMP_INVERTING_DAC3);
             w.hyst().bits(board::COMP_HYSTERESIS);
         }
-        // The other input is the pin of the dc link (PA1); a high output means over-voltage.
-        w.inpsel().clear_bit().pol().clear_bit().en().set_bit()
+        // The other input is the pin of the dc link; a high output means over-voltage.
+        w.inpsel().bit(board::COMPARATOR.1 == 1).pol().clear_bit().en().set_bit()
     });
     asm::delay(board::COMP_START_US * board::CYCLES_PER_US);
 
-    let csr = comparators.c1csr();
     let filtered = || {
         asm::delay(board::BREAK_FILTER_NS * board::CYCLES_PER_US / 1000 + board::CYCLES_PER_US);
     };
@@ -118,7 +124,7 @@ pub fn prove(dc_link: u16) -> bool {
     let trips_at = |code: u16| {
         dac.dhr12r1().write(|w| w.daccdhr().set(code));
         asm::delay(board::DAC_START_US * board::CYCLES_PER_US);
-        comparators.c1csr().read().value().bit()
+        csr(comparators).read().value().bit()
     };
     let proved = trips_at(dc_link / 2) & !trips_at(level);
     PROVED.store(proved, Ordering::Relaxed);

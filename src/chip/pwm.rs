@@ -110,7 +110,10 @@ impl Pwm {
         // The break inputs: the fault output of the power stage, and the comparator of the dc link, which trips high. One OR gate
         // combines them, so each must be low after its own polarity in normal operation, and the break itself is active high (BKP below).
         let trips_at_low = SELECTED.fault.trips_at.value == Level::Low;
-        timer.af1().write(|w| w.bkine().set_bit().bkinp().bit(trips_at_low).bkcmp1e().set_bit());
+        timer.af1().write(|w| {
+            w.bkine().set_bit().bkinp().bit(trips_at_low);
+            w.bkcmp1e().bit(board::COMPARATOR.0 == 0).bkcmp3e().bit(board::COMPARATOR.0 == 1)
+        });
         // One write for all, including the lock, which counts from the first write after a reset (`stm32g4xx_ll_tim.h`). It keeps dead
         // time, polarity, break, idle level and output mode until the next reset.
         timer.bdtr().write(|w| {
@@ -143,7 +146,7 @@ impl Pwm {
 
         // Pulled to the level that trips, so that a broken wire trips as well.
         let fault = SELECTED.fault;
-        pins::alternate(fault.pin, fault.pin.function(&pin::TIM1_BKIN), Some(fault.trips_at.value));
+        pins::alternate(fault.pin, fault.pin.function(pin::TIM1_BKIN), Some(fault.trips_at.value));
 
         Ok(Self { timer, on: false, armed: DISARMED })
     }

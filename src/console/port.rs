@@ -14,8 +14,7 @@ use stm32g4xx_hal::stm32::interrupt;
 
 use super::handle;
 use crate::board;
-use crate::boards::Level;
-use crate::boards::pin::pa;
+use crate::boards::{Level, SELECTED, pin};
 use crate::chip::{LOWEST_PRIORITY, pins};
 
 /// Size of the receive queue, bytes; it holds one byte less, 22 ms at full rate. The main loop reads it a thousand times as often.
@@ -69,9 +68,10 @@ impl Lpuart {
         let (to_send, read_to_send) = to_send.split();
 
         rcc.apb1enr2().modify(|_, w| w.lpuart1en().enabled());
-        pins::alternate(pa(2), board::SERIAL_AF, None);
+        let [transmit, receive] = SELECTED.wiring.console;
+        pins::alternate(transmit, transmit.function(pin::LPUART1_TX), None);
         // Pulled up: an open input stays idle.
-        pins::alternate(pa(3), board::SERIAL_AF, Some(Level::High));
+        pins::alternate(receive, receive.function(pin::LPUART1_RX), Some(Level::High));
 
         // The interrupt is raised by damaged bytes, too.
         port.cr3().write(|w| w.eie().enabled());

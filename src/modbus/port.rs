@@ -13,8 +13,8 @@ use stm32g4xx_hal::pac::{self, Interrupt};
 use stm32g4xx_hal::rcc::Rcc;
 use stm32g4xx_hal::stm32::interrupt;
 
-use crate::boards::pin::{Pin, USART3_RX, USART3_TX};
-use crate::boards::{Level, Rs485};
+use crate::boards::pin::Pin;
+use crate::boards::{Level, Rs485, pin};
 use crate::chip::{LOWEST_PRIORITY, pins};
 use crate::link::mailbox::{Mailbox, Receiver, Sender};
 use crate::modbus::settings::{Baud, Format, Settings};
@@ -83,9 +83,9 @@ impl Usart {
         rcc.apb1enr1().modify(|_, w| w.usart3en().enabled());
         pins::output(wires.driver, Level::Low);
         let (transmit, receive) = (wires.transmit, wires.receive);
-        pins::alternate(transmit, transmit.function(&USART3_TX), None);
+        pins::alternate(transmit, transmit.function(pin::USART3_TX), None);
         // Pulled up: an open input stays idle.
-        pins::alternate(receive, receive.function(&USART3_RX), Some(Level::High));
+        pins::alternate(receive, receive.function(pin::USART3_RX), Some(Level::High));
 
         let end = PortInterrupt {
             port,

@@ -4,6 +4,7 @@
 //! the dead time's clock (CKD). The values after the start, which reads its settings back, are the reference.
 
 use super::record::{Reason, Record};
+use crate::board;
 
 /// Registers read in a pass of the main loop.
 const SLICE: usize = 8;
@@ -49,8 +50,8 @@ const CONFIGURED: [(u32, &[u16]); 21] = [
     (0x5000_0300, &[8]),
     // DAC3: CR, DHR12R1, MCR
     (0x5000_1000, &[0, 8, 0x3c]),
-    // COMP1: CSR
-    (0x4001_0200, &[0]),
+    // The comparator: CSR
+    (board::COMPARATOR_CSR, &[0]),
     // SYSCFG: CFGR2
     (0x4001_0000, &[0x1c]),
     // Ports A, B, C: MODER, OTYPER, PUPDR, AFRL, AFRH
@@ -80,7 +81,7 @@ const PARTS: [(u32, u32); 13] = [
     (0x4000_0000, !DIR),
     (0x5000_0008, ADC_RUNS),
     (0x5000_0108, ADC_RUNS),
-    (0x4001_0200, !OUTPUT),
+    (board::COMPARATOR_CSR, !OUTPUT),
     (0x4001_001c, 0xf),
     (0xe000_e410, 0xff << 16),
     (0xe000_e424, 0xff << 24),

@@ -17,7 +17,7 @@ use std::collections::VecDeque;
 use anyhow::{Result, anyhow, bail, ensure};
 use drive_core::{Sample, Telemetry};
 use hil_sim::plant::Plant;
-use induction_drive::board::{HSE_HZ, PWM_TOP};
+use induction_drive::board::PWM_TOP;
 
 pub use control::{LongestPath, Period};
 pub use debugger::Debugger;
@@ -25,7 +25,8 @@ use motor::Connection;
 pub use motor::Disturbance;
 pub use options::Options;
 
-use crate::{addresses::Addresses, image::Image, log::Log, power_stage::watch::GateWatch};
+use crate::power_stage::{COMPARED, watch::GateWatch};
+use crate::{addresses::Addresses, image::Image, log::Log};
 use control::RunningInterrupt;
 use stm32g4_unicorn::chip::{ADC_INTERRUPT, TICKS_PER_S, pins::Pin};
 use stm32g4_unicorn::{memory, periph::Reset, periph::iwdg::LSI_HZ, rules::Violation};
@@ -39,9 +40,8 @@ pub type Cpu = stm32g4_unicorn::Cpu<GateWatch>;
 pub const CONTROL_INTERRUPT: u16 = ADC_INTERRUPT;
 /// Ticks of a PWM period, from one top of the counter to the next.
 pub const TICKS_PER_PERIOD: u64 = 2 * PWM_TOP as u64;
-/// The pins of the brake chopper, of the precharge relay, and of the driver of the field bus.
+/// The pins of the brake chopper and of the driver of the field bus.
 const CHOPPER: Pin = (2, 6);
-const RELAY: Pin = (2, 8);
 const BUS_DRIVER: Pin = (2, 12);
 
 /// Number of periods after which the log is fetched, before its buffer in RAM is full.
@@ -141,16 +141,19 @@ impl Board {
         if options.confirmed {
             confirmed::save(&options, &mut chip.flash)?;
         }
-        chip.rcc.crystal_hz = HSE_HZ;
+        let wiring = options.power_stage.wiring;
+        chip.rcc.crystal_hz = wiring.crystal_hz;
         chip.bus_driver = Some(BUS_DRIVER);
         chip.circuit = GateWatch::new(options.power_stage, &chip.gpio, &chip.tim1);
         chip.follow_pins();
-        chip.pa1.source = options.dc_link_pin;
+        chip.net.source = options.dc_link_pin;
+        chip.net_at = COMPARED.iter().position(|at| *at == wiring.dc_link).unwrap_or(0);
+        chip.break_pin = wiring.fault.0;
         chip.break_pull_ohm = options.fault_pull_ohm;
         board.show_sample();
         // The dc link is charged before the first period. (A copy is used, so that the noise of the periods is the same.)
         let dc_link = board.plant.clone().sample().dc_link;
-        board.chip().compare(0, 0, dc_link);
+        board.show_dc_link(dc_link);
         board.cpu.chip_mut().keep_blocks = options.counting.cycles;
         board.cpu.chip_mut().rules.coarse = !options.counting.every_instruction;
         board.cpu.reset(memory::FLASH);
@@ -197,7 +200,15 @@ impl Board {
 
     /// Whether the precharge relay is closed.
     pub fn is_precharged(&self) -> bool {
-        self.cpu.chip().drives_high(RELAY)
+        let chip = self.cpu.chip();
+        chip.drives_high(chip.circuit.stage.wiring.relay)
+    }
+
+    /// Passes ADC counts of the dc link to the pins that are compared; the others have none.
+    pub fn show_dc_link(&mut self, counts: u16) {
+        let at = self.chip().circuit.stage.wiring.dc_link;
+        let [pa0, pc1, pa1] = COMPARED.map(|channel| if channel == at { counts } else { 0 });
+        self.chip().compare(pa0, pc1, pa1);
     }
 
     /// Returns the last sample.

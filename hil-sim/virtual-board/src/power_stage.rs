@@ -19,25 +19,33 @@ pub use boards::{ALL, REFERENCE};
 use driver::Driver;
 use shunts::Shunts;
 pub use stm32g4_unicorn::chip::CODES;
+use stm32g4_unicorn::chip::pins::Pin;
 use stm32g4_unicorn::circuit::{SUPPLY_V, Source};
 
-/// The six inputs of the drivers at the chip: port (0 is A) and number of the pins of the high and the low side of the
-/// legs a, b and c. This is ST's morpho connector for motor control, which is the same on all boards here: PA8, PA7;
-/// PA9, PB0; PA10, PB1.
-pub const GATE_PINS: [[(usize, u32); 2]; 3] =
-    [[(0, 8), (0, 7)], [(0, 9), (1, 0)], [(0, 10), (1, 1)]];
-/// Alternate function that connects these pins with TIM1 (datasheet).
-pub const GATE_FUNCTION: u32 = 6;
+/// A pin with its alternate function for TIM1 (datasheet).
+pub type TimerPin = (Pin, u32);
 
-/// Channels of the analog signals, the same for ADC1 and ADC2: PA0, PC1, PC0, PA1, PC2 (datasheet).
-pub mod channel {
-    /// Currents of a, b and c.
-    pub const CURRENTS: [usize; 3] = [1, 7, 6];
-    /// Dc link.
-    pub const DC_LINK: usize = 2;
-    /// Heat sink.
-    pub const HEAT_SINK: usize = 8;
+/// The connections of the chip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wiring {
+    /// The inputs of the drivers: high and low side of the legs a, b and c.
+    pub gates: [[TimerPin; 2]; 3],
+    /// The fault input.
+    pub fault: TimerPin,
+    /// Channels of the currents a, b and c: ADC1, ADC2 and both.
+    pub currents: [usize; 3],
+    /// Channel of the dc link at ADC1.
+    pub dc_link: usize,
+    /// Channel of the heat sink at ADC2.
+    pub heat_sink: usize,
+    /// The precharge relay.
+    pub relay: Pin,
+    /// Crystal, Hz.
+    pub crystal_hz: u32,
 }
+
+/// Channels of the pins that can be compared: PA0, PC1, PA1 (datasheet).
+pub const COMPARED: [usize; 3] = [1, 7, 2];
 
 /// Reference voltage of the ADCs, V: the supply of the Nucleo board.
 pub const REFERENCE_V: f64 = SUPPLY_V;
@@ -74,6 +82,8 @@ impl Switches {
 pub struct PowerStage {
     /// Name on the command line, which is that of the firmware's board.
     pub name: &'static str,
+    /// The connections of the chip.
+    pub wiring: Wiring,
     /// The drivers of the gates.
     pub driver: Driver,
     /// Limits of the gate signals that the switches permit.
@@ -84,7 +94,7 @@ pub struct PowerStage {
     pub dc_link_pin: Source,
     /// Resistor from the fault input to the supply of the chip, ohm.
     pub fault_pull_ohm: f64,
-    /// Pins, as in [`GATE_PINS`], that the board ties to nets of other signals: they stay analog.
+    /// Pins that the board ties to nets of other signals: they stay analog.
     pub analog_only: &'static [(usize, u32)],
     /// Pins of the terminal strip, as in "A8 - C0", with `-` for none: contacts to ground, outputs, and analog inputs
     /// including that of the motor's sensor.

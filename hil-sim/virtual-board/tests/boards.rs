@@ -7,10 +7,10 @@ use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::config::LoadMode;
 use hil_sim::plant::Load;
-use induction_drive::boards::{self, ANALOG, CONTACTS, Currents, Level};
+use induction_drive::boards::{self, ANALOG, CONTACTS, Currents, Level, pin::Pin};
 use stm32g4_unicorn::periph::Reset;
 use virtual_board::board::Debugger;
-use virtual_board::power_stage::{ALL, CODES, REFERENCE_V, channel};
+use virtual_board::power_stage::{ALL, CODES, REFERENCE_V};
 use virtual_board::{Board, Image, Options, PowerStage};
 
 use crate::common::off_for;
@@ -58,11 +58,21 @@ fn the_firmware_and_the_power_stage_agree() {
         // Pins.
         let Currents { a, b, shunts } = board.currents;
         let sensors = [a, b].into_iter().chain(shunts.map(|shunts| shunts.c));
-        for (sensor, channel) in sensors.zip(channel::CURRENTS) {
-            assert_eq!(sensor.pin.adc1().map(usize::from), Some(channel), "{name}");
+        let wiring = stage.wiring;
+        for (n, (sensor, channel)) in sensors.zip(wiring.currents).enumerate() {
+            let at = if n == 1 { sensor.pin.adc2() } else { sensor.pin.adc1() };
+            assert_eq!(at.map(usize::from), Some(channel), "{name}");
         }
-        assert_eq!(board.dc_link.pin.adc1().map(usize::from), Some(channel::DC_LINK));
-        assert_eq!(board.heat_sink.adc2().map(usize::from), Some(channel::HEAT_SINK));
+        assert_eq!(board.dc_link.pin.adc1().map(usize::from), Some(wiring.dc_link), "{name}");
+        assert_eq!(board.heat_sink.adc2().map(usize::from), Some(wiring.heat_sink), "{name}");
+        let place = |pin: Pin| (pin.port as usize, u32::from(pin.number));
+        for leg in 0..3 {
+            let [high, low] = wiring.gates[leg].map(|gate| gate.0);
+            assert_eq!((place(board.high.pins[leg]), place(board.low.pins[leg])), (high, low));
+        }
+        let (fault, relay) = (place(board.fault.pin), place(board.wiring.relay));
+        assert_eq!((fault, relay), (wiring.fault.0, wiring.relay), "{name}");
+        assert_eq!(board.wiring.crystal_hz, wiring.crystal_hz, "{name}");
         let analog = board.analog_only.iter().map(|pin| (pin.port as usize, u32::from(pin.number)));
         assert_eq!(analog.collect::<Vec<_>>(), stage.analog_only, "{name}");
         let (analog, others) = board.terminals.pins.split_at(ANALOG);
@@ -240,4 +250,15 @@ fn an_ihm023v3_works_and_every_end_leaves_its_gates_off() -> Result<()> {
 #[test]
 fn an_ipmm10b_works_and_every_end_leaves_its_gates_off() -> Result<()> {
     works(ALL[3])
+}
+
+#[test]
+fn an_ipm10b_works_and_every_end_leaves_its_gates_off() -> Result<()> {
+    works(ALL[4])
+}
+
+/// All pins that can be elsewhere are elsewhere.
+#[test]
+fn another_wiring_works_and_every_end_leaves_its_gates_off() -> Result<()> {
+    works(ALL[5])
 }

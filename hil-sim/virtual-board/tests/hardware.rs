@@ -25,10 +25,11 @@ fn board(stage: &'static PowerStage) -> Result<Board> {
 /// Returns the gates that are requested on, or may be, of a chip that stands still.
 fn gates_on(board: &mut Board) -> Vec<String> {
     let chip = board.chip();
-    let driver = chip.circuit.stage.driver;
+    let stage = chip.circuit.stage;
     let mut on = Vec::new();
     for (leg, name) in ["a", "b", "c"].into_iter().enumerate() {
-        let requests = driver.requests(leg, &chip.gpio, &chip.tim1, true);
+        let pins = stage.wiring.gates[leg];
+        let requests = stage.driver.requests(pins, leg, &chip.gpio, &chip.tim1, true);
         for (side, request) in ["high", "low"].into_iter().zip(requests) {
             match request {
                 None => on.push(format!("{side} {name} perhaps")),

@@ -23,6 +23,7 @@ mod motors;
 mod orders;
 mod preemption;
 mod printed;
+mod reach;
 mod record;
 mod register_check;
 mod rows;

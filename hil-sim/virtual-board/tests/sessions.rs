@@ -230,7 +230,7 @@ fn at_the_bench(board: &mut Board, name: &str, value: &str) -> Result<Option<Opt
 fn charge(board: &mut Board, volts: f64) -> Result<()> {
     board.plant.set_dc_link(volts)?;
     let dc_link = board.plant.clone().sample().dc_link;
-    board.chip().compare(0, 0, dc_link);
+    board.show_dc_link(dc_link);
     Ok(())
 }
 

@@ -9,7 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::{Board, Chip, Options, TICKS_PER_PERIOD};
 use crate::power_stage::bridge::{Bridge, Leg};
 use crate::power_stage::shunts::{Amplifiers, Currents, Shunts};
-use crate::power_stage::{CODES, channel};
+use crate::power_stage::{CODES, COMPARED};
 use stm32g4_unicorn::chip::TICKS_PER_S;
 
 /// A change of the samples.
@@ -123,7 +123,7 @@ impl ShuntReader {
         let now = self.top.time;
         let samplings = chip.adc.samplings(chip.tim1.trigger_after_top().map(|after| now + after));
         let asked = |converter: usize, leg: usize| {
-            let channel = channel::CURRENTS[leg] as u32;
+            let channel = chip.circuit.stage.wiring.currents[leg] as u32;
             samplings[converter].iter().find(|one| one.0 == channel).map(|one| one.1)
         };
         let instants = [0, 1].map(|converter| [0, 1, 2].map(|leg| asked(converter, leg)));
@@ -252,16 +252,21 @@ impl Board {
         }
         let of = |s: &Sample| [s.current_a, s.current_b, s.current_c];
         let (now, before) = (of(sample), of(&undisturbed));
+        let wiring = chip.circuit.stage.wiring;
         for (converter, inputs) in chip.adc.inputs.iter_mut().enumerate() {
-            for (leg, channel) in channel::CURRENTS.into_iter().enumerate() {
+            for (leg, channel) in wiring.currents.into_iter().enumerate() {
                 // A disturbed sensor is disturbed for both ADCs.
                 let own = seen.filter(|_| now[leg] == before[leg]);
                 inputs[channel] = own.map_or(now[leg], |codes| codes[converter][leg]);
             }
-            inputs[channel::HEAT_SINK] = sample.heat_sink;
+            inputs[wiring.heat_sink] = sample.heat_sink;
         }
-        let s = *sample;
-        chip.tim2.position = s.encoder;
-        chip.compare(s.current_a, s.current_b, s.dc_link);
+        chip.tim2.position = sample.encoder;
+        let [a, b, _] = wiring.currents;
+        let signals = [(a, now[0]), (b, now[1]), (wiring.dc_link, sample.dc_link)];
+        let [pa0, pc1, pa1] = COMPARED.map(|channel| {
+            signals.iter().find(|(at, _)| *at == channel).map_or(0, |(_, counts)| *counts)
+        });
+        chip.compare(pa0, pc1, pa1);
     }
 }

@@ -5,10 +5,22 @@ use stm32g4_unicorn::circuit::{Pull, Source};
 
 use super::driver::{Driver, Input};
 use super::shunts::Shunts;
-use super::{GateLimits, PowerStage, Switches};
+use super::{GateLimits, PowerStage, Switches, Wiring};
 
 /// All boards.
-pub const ALL: [&PowerStage; 4] = [&REFERENCE, &IHM08M1, &IHM023V3, &IPMM10B];
+pub const ALL: [&PowerStage; 6] = [&REFERENCE, &IHM08M1, &IHM023V3, &IPMM10B, &IPM10B, &OWN_BOARD];
+
+/// A NUCLEO-G474RE, whose motor-control pins on ST's morpho connector are the same for all power boards (UM2505).
+const NUCLEO: Wiring = Wiring {
+    gates: [[((0, 8), 6), ((0, 7), 6)], [((0, 9), 6), ((1, 0), 6)], [((0, 10), 6), ((1, 1), 6)]],
+    fault: ((0, 6), 6),
+    // PA0, PC1, PC0, PA1, PC2.
+    currents: [1, 7, 6],
+    dc_link: 2,
+    heat_sink: 8,
+    relay: (2, 8),
+    crystal_hz: 24_000_000,
+};
 
 /// TTL levels: below 0.8 V is low, above 2.0 V high.
 const TTL: (f64, f64) = (0.8, 2.0);
@@ -57,6 +69,7 @@ const AMPLIFIERS: Shunts = Shunts {
 /// of 10 kOhm, as the documentation requires, without interlock.
 pub const REFERENCE: PowerStage = PowerStage {
     name: "reference",
+    wiring: NUCLEO,
     driver: Driver { high: PULLED_DOWN, low: PULLED_DOWN, interlock: false, dead_time_s: 0.0 },
     // 2.2 us (section 3.9). A microsecond, minus the rounding to counts.
     limits: GateLimits { dead_time_s: 2.2e-6, pulse_s: 168.0 / 170e6 },
@@ -130,4 +143,34 @@ const IPMM10B: PowerStage = PowerStage {
     shunts: Some(Shunts { volts_per_a: -0.08 * 2.1, zero_v: 1.65, ..AMPLIFIERS }),
     delay_and_drop: Some((125e-9, 1.0)),
     ..IHM023V3
+};
+
+/// STEVAL-IPM10B with X-NUCLEO-IHM09M1 at 320 V: a SLLIMM module of the second series, STGIB10CH60TS-L. Full range of the dc link: 415.8 V
+/// in ST's motor-control library of 2016. The scale of the currents is assumed: the range ends at the peak current of the module, 25 A.
+const IPM10B: PowerStage = PowerStage {
+    name: "nucleo-g474re-ipm10b",
+    shunts: Some(Shunts { volts_per_a: -0.066, zero_v: 1.65, ..AMPLIFIERS }),
+    dc_link_divider: Some(126.0),
+    ..IPMM10B
+};
+
+/// The inverter of the dissertation at other pins: PC0, PB13; PC1, PB14; PC2, PB15; fault input PB12; currents at PA1 and PA7, dc link at
+/// PA0, heat sink at PA6. Relay at PC9.
+const OWN_BOARD: PowerStage = PowerStage {
+    name: "own-board",
+    wiring: Wiring {
+        gates: [
+            [((2, 0), 2), ((1, 13), 6)],
+            [((2, 1), 2), ((1, 14), 6)],
+            [((2, 2), 2), ((1, 15), 4)],
+        ],
+        fault: ((1, 12), 6),
+        currents: [2, 4, 6],
+        dc_link: 1,
+        heat_sink: 3,
+        relay: (2, 9),
+        crystal_hz: 8_000_000,
+    },
+    terminals: ["- - - - - - -", "- - -", "- - -"],
+    ..REFERENCE
 };

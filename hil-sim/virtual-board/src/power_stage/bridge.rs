@@ -5,7 +5,6 @@ use induction_drive::board::PWM_TOP;
 use thiserror::Error;
 
 use super::PowerStage;
-use super::driver::Driver;
 use stm32g4_unicorn::periph::tim1::{Tim1, Wave};
 use stm32g4_unicorn::{chip::TICKS_PER_S, periph::gpio::Gpio};
 
@@ -110,7 +109,7 @@ impl Bridge {
     pub fn new(stage: &PowerStage, gpio: &[Gpio], tim1: &Tim1) -> Self {
         let own = ticks(stage.driver.dead_time_s);
         Self {
-            legs: [0, 1, 2].map(|leg| Leg::new(&stage.driver, own, leg, gpio, tim1)),
+            legs: [0, 1, 2].map(|leg| Leg::new(stage, own, leg, gpio, tim1)),
             outputs_on: tim1.outputs_on(),
             dead_time: own.max(tim1.dead_time()),
         }
@@ -164,15 +163,16 @@ fn ticks(seconds: f64) -> u32 {
 }
 
 impl Leg {
-    fn new(driver: &Driver, own: u32, leg: usize, gpio: &[Gpio], tim1: &Tim1) -> Self {
+    fn new(stage: &PowerStage, own: u32, leg: usize, gpio: &[Gpio], tim1: &Tim1) -> Self {
         let period = tim1.period();
-        let requests = driver.requests(leg, gpio, tim1, true);
+        let (driver, pins) = (&stage.driver, stage.wiring.gates[leg]);
+        let requests = driver.requests(pins, leg, gpio, tim1, true);
         let undefined = requests.map(|request| request.is_none());
         // In the worst case a switch whose level is not defined is on.
         let [high, low] =
             requests.map(|request| request.unwrap_or_else(|| Wave::constant(period, true)));
         let (pieces, interlocked) = pieces(high, low, driver.interlock);
-        let ideal = driver.requests(leg, gpio, tim1, false);
+        let ideal = driver.requests(pins, leg, gpio, tim1, false);
         let compare = match ideal {
             [Some(high), Some(low)] if low == high.inverted() => {
                 // As a share of the plant's top, independent of the timer's.

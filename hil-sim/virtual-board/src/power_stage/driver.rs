@@ -1,6 +1,6 @@
 //! The gate drivers: levels at their inputs, and whether these request on.
 
-use super::{GATE_FUNCTION, GATE_PINS};
+use super::TimerPin;
 use stm32g4_unicorn::circuit::{PULL_OHM, Pull, SUPPLY_V, level};
 use stm32g4_unicorn::periph::gpio::{Gpio, Pad};
 use stm32g4_unicorn::periph::tim1::{Output, Tim1, Wave};
@@ -41,13 +41,13 @@ impl Input {
         level(self.pull.into_iter().chain(chip), self.thresholds)
     }
 
-    fn request(&self, pin: (usize, u32), output: Output, gpio: &[Gpio], period: u32) -> Request {
-        let (port, number) = pin;
+    fn request(&self, pin: TimerPin, output: Output, gpio: &[Gpio], period: u32) -> Request {
+        let ((port, number), function) = pin;
         let port = &gpio[port];
         let asks = |wave: Wave| if self.on_at_high { wave } else { wave.inverted() };
         let driven = match port.pad(number) {
             Pad::Output(level) => Output::Driven(Wave::constant(period, level)),
-            Pad::Alternate(GATE_FUNCTION) => output,
+            Pad::Alternate(alternate) if alternate == function => output,
             // The pin belongs to another peripheral, so its level is unknown.
             Pad::Alternate(_) => Output::Unknown,
             Pad::Input | Pad::Analog => Output::Released,
@@ -71,13 +71,13 @@ impl Driver {
     /// Returns the requests of high and low side of a leg, with the timer's dead time or as if it inserted none.
     pub fn requests(
         &self,
+        [high, low]: [TimerPin; 2],
         leg: usize,
         gpio: &[Gpio],
         tim1: &Tim1,
         dead_time: bool,
     ) -> [Request; 2] {
         let outputs = tim1.outputs(leg, dead_time);
-        let [high, low] = GATE_PINS[leg];
         [
             self.high.request(high, outputs[0], gpio, tim1.period()),
             self.low.request(low, outputs[1], gpio, tim1.period()),

@@ -44,7 +44,7 @@ const IRQ_LPUART: u16 = 91;
 /// Exception number of ADC1 and ADC2.
 pub const ADC_INTERRUPT: u16 = 16 + IRQ_ADC1_2;
 
-/// Damage inside the chip to a protection by DAC3, comparator 1 and its connection to the break of TIM1.
+/// Damage inside the chip to a protection by DAC3, a comparator and its connection to the break of TIM1.
 /// It persists over resets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Damage {
@@ -104,7 +104,7 @@ defaults! {
         pub(crate) guard_hit: Option<u32>,
         /// State of the halt, if a debugger has halted the core.
         pub(crate) halt: Option<Halt>,
-        /// Damage to the protection by comparator 1.
+        /// Damage to the protection by the comparator of the net.
         pub damage: Option<Damage>,
         /// Error of the core clock, as a share, and error of the reference of the ADCs.
         clock_error: f64,
@@ -117,11 +117,15 @@ defaults! {
         system_rose: u64,
         /// ADC counts that the outside applies to PA0, PC1, PA1.
         analog: [u16; 3],
-        /// The net at PA1.
-        pub pa1: AnalogNet,
+        /// A net at one of these pins with a circuit of its own.
+        pub net: AnalogNet,
+        /// The place of its pin among them.
+        pub net_at: usize = 2,
         /// Counts by which an input must exceed the level of a comparator: offset of this part, and zero error of its DAC.
         pub comparator_offset: u16,
-        /// Resistor from the break input (PA6) to the supply, ohm.
+        /// The pin of the break input.
+        pub break_pin: Pin = (0, 6),
+        /// Resistor from the break input to the supply, ohm.
         pub break_pull_ohm: f64 = f64::INFINITY,
         /// Whether the outside pulls the break input low.
         break_low: bool,
@@ -201,7 +205,7 @@ impl<C: Circuit> Chip<C> {
         old.rcc.flags |= rcc::flags_of(cause);
         keep! { self, old:
             now accesses instructions keep_blocks watched forgiving rules flash_cycles
-            analog pa1 comparator_offset break_pull_ohm break_low bus_driver damage clock_error reference_error
+            analog net net_at comparator_offset break_pin break_pull_ohm break_low bus_driver damage clock_error reference_error
             pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers slow_adc.inputs grounded lifted tim1.drop_update tim2.position
             rcc.flags rcc.crystal_hz rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line circuit tim5.captures
             flash.bytes flash.torn flash.torn_code flash.operations flash.options
@@ -270,7 +274,7 @@ impl<C: Circuit> Chip<C> {
             self.comp.iter().map(Comparator::next_event).fold(NEVER, u64::min),
             self.dac[0].next_event(self.now),
             self.dac[1].next_event(self.now),
-            self.pa1.next_event(),
+            self.net.next_event(),
             self.back_on.unwrap_or(NEVER),
             self.now.saturating_add(PATIENCE),
         ]

@@ -129,14 +129,16 @@ impl Script {
         Ok(())
     }
 
-    /// Connects the pins of the gates to the timer.
+    /// Connects the pins of the gates and the fault input to the timer.
     pub fn pins(&mut self) -> Result<()> {
-        self.modify(GPIOA + 0x20, 0xff << 24, 0x66 << 24)?;
-        self.modify(GPIOA + 0x24, 0xfff, 0x666)?;
-        self.modify(GPIOB + 0x20, 0xff, 0x66)?;
-        // PA6 is the fault input.
-        self.modify(GPIOA + MODER, 0x3f_f000, 0x2a_a000)?;
-        self.modify(GPIOB + MODER, 0xf, 0xa)
+        let wiring = self.board.chip().circuit.stage.wiring;
+        let pins = wiring.gates.as_flattened().iter().chain([&wiring.fault]);
+        pins.into_iter().try_for_each(|((port, pin), function)| {
+            let (port, half) = (GPIOA + 0x400 * *port as u32, 4 * (pin / 8));
+            let shift = 4 * (pin % 8);
+            self.modify(port + 0x20 + half, 0xf << shift, function << shift)?;
+            self.modify(port + MODER, 3 << (2 * pin), 2 << (2 * pin))
+        })
     }
 
     /// Sets timer and pins up: counting, with the outputs off.

@@ -1,5 +1,6 @@
-//! The nets at two pins of the chip, and their observers: PA1 with the comparators, and PA6 with the break of TIM1.
+//! The nets at two pins of the chip, and their observers: a pin with a comparator, and a pin with the break of TIM1.
 
+use super::pins::Pin;
 use super::{CODES, Chip, Circuit, Damage, TICKS_PER_S};
 use crate::circuit::{PULL_OHM, Pull, SUPPLY_V, Source, level};
 use crate::periph::{NEVER, dac::Dac};
@@ -11,8 +12,8 @@ const STRONGEST_PULL_OHM: f64 = 25e3;
 const FULL_SCALE: f64 = CODES - 1.0;
 /// Number of checks of a moving pin per time constant.
 const LOOKS: f64 = 50.0;
-/// Channel of ADC1 and ADC2 at PA1 (datasheet).
-const PA1_CHANNEL: usize = 2;
+/// The pins of comparators 1 and 3, PA0, PC1 and PA1: their channel of ADC1 and ADC2 (datasheet), and the comparator, counted from 0.
+const COMPARED: [(Pin, usize, usize); 3] = [((0, 0), 1, 2), ((2, 1), 7, 2), ((0, 1), 2, 0)];
 
 /// The net at an analog pin; by default something drives it.
 #[derive(Clone, Debug, Default)]
@@ -78,11 +79,13 @@ impl<C: Circuit> Chip<C> {
 
     /// Passes the present levels of the pins to the ADCs and the comparators.
     pub(super) fn compare_now(&mut self) {
-        let [pa0, pc1, open] = self.analog;
-        let pa1 = self.pa1.follow(open, self.gpio[0].pull(1), self.now);
+        let ((port, pin), channel, watched) = COMPARED[self.net_at];
+        let (mut codes, pull) = (self.analog, self.gpio[port].pull(pin));
+        codes[self.net_at] = self.net.follow(codes[self.net_at], pull, self.now);
         for inputs in &mut self.adc.inputs {
-            inputs[PA1_CHANNEL] = pa1;
+            inputs[channel] = codes[self.net_at];
         }
+        let [pa0, pc1, pa1] = codes;
         self.comp[0].input = pa1;
         self.comp[2].input = if self.comp[2].input_pin() == 0 { pa0 } else { pc1 };
         for n in [0, 2] {
@@ -90,11 +93,11 @@ impl<C: Circuit> Chip<C> {
             self.comp[n].reference = code.map_or(u16::MAX, |code| code + self.comparator_offset);
         }
         match self.damage {
-            Some(Damage::Level(code)) => self.comp[0].reference = code,
-            Some(Damage::Input) => self.comp[0].input = 0,
+            Some(Damage::Level(code)) => self.comp[watched].reference = code,
+            Some(Damage::Input) => self.comp[watched].input = 0,
             Some(Damage::Comparator | Damage::Break) | None => {}
         }
-        self.comp[0].stuck_low = self.damage == Some(Damage::Comparator);
+        self.comp[watched].stuck_low = self.damage == Some(Damage::Comparator);
         self.comp.iter_mut().for_each(|comparator| comparator.look(self.now));
         let reaches = self.damage != Some(Damage::Break);
         self.tim1.set_comparators(std::array::from_fn(|n| reaches && self.comp[n].output()));
@@ -116,10 +119,11 @@ impl<C: Circuit> Chip<C> {
         self.follow_break_pin();
     }
 
-    /// Updates the level of the break input (PA6), which follows from the resistors outside and in the port. It is
+    /// Updates the level of the break input, which follows from the resistors outside and in the port. It is
     /// certain below 0.3 and above 0.7 of the supply (datasheet, VIL and VIH).
     pub(super) fn follow_break_pin(&mut self) {
-        let port = self.gpio[0].pull(6).map(|up| (up, STRONGEST_PULL_OHM));
+        let (port, pin) = self.break_pin;
+        let port = self.gpio[port].pull(pin).map(|up| (up, STRONGEST_PULL_OHM));
         let pulls = [(true, self.break_pull_ohm)].into_iter().chain(port);
         let pulls = pulls.map(|(up, ohm)| Pull { volts: if up { SUPPLY_V } else { 0.0 }, ohm });
         let released = level(pulls, (0.3 * SUPPLY_V, 0.7 * SUPPLY_V));
