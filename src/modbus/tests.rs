@@ -404,7 +404,7 @@ fn the_manual_lists_the_refusals() {
         ),
         (
             Refusal::Staged,
-            "settings are staged and not in force, or the console has lines of another board",
+            "settings are staged and not in force, or the console has lines of another board or of a backup that is not whole",
             "`apply` or `revert` at the console",
         ),
         (

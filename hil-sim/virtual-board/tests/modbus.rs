@@ -184,6 +184,62 @@ fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     Ok(())
 }
 
+/// Sends frames; each must be answered without an exception.
+fn replay(master: &mut Master, frames: &str) -> Result<()> {
+    frames.split(" | ").try_for_each(|frame| {
+        let bytes = frame.split(' ').map(|byte| u8::from_str_radix(byte, 16));
+        let pdu = bytes.collect::<Result<Vec<_>, _>>()?;
+        let answer = master.ask(&pdu)?;
+        ensure!(answer[0] == pdu[0], "{frame} gave {answer:x?}");
+        Ok(())
+    })
+}
+
+/// Repeats frames four times a second, or as often as the line takes them.
+fn repeat(master: &mut Master, frames: &str, seconds: f64) -> Result<()> {
+    let end = master.board.time() + seconds;
+    while master.board.time() < end {
+        let next = master.board.time() + 0.25;
+        replay(master, frames)?;
+        let rest = (next - master.board.time()) * 6000.0;
+        master.board.run_periods(rest.max(0.0) as u64)?;
+    }
+    Ok(())
+}
+
+/// The frames that masters send run a spindle, stop it, start it again while it turns, and stop it.
+#[test]
+fn recipes_of_masters_run_stop_and_restart_a_turning_spindle() -> Result<()> {
+    let recipes = include_str!("recipes.txt").split("\n\n").skip(1);
+    let mut replayed = 0;
+    for recipe in recipes {
+        let title = recipe.lines().next().context("a title")?;
+        let find = |name: &str| recipe.lines().find_map(|line| line.strip_prefix(name));
+        let frames = |name| find(name).with_context(|| format!("{title}: no {name}"));
+        let (run, rest) = (frames("run: ")?, frames("rest: ")?);
+        let typed = find("console: ").unwrap_or(BUS[0]);
+        let mut master = Master::new(&[BUS[0], typed, BUS[1]])?;
+        for start in ["start: ", "again: "] {
+            replay(&mut master, frames(start)?)?;
+            repeat(&mut master, run, 5.5)?;
+            let rpm = master.rpm();
+            ensure!((rpm / 300.0 - 1.0).abs() < 0.03, "{title}, {start}{rpm} rpm");
+            replay(&mut master, frames("stop: ")?)?;
+            repeat(&mut master, rest, 0.3)?;
+            let rpm = master.rpm();
+            ensure!((30.0..290.0).contains(&rpm), "{title}: {rpm} rpm after the stop");
+        }
+        repeat(&mut master, rest, 4.0)?;
+        ensure!(!master.outputs_on(), "{title}: not off");
+        // Off, at standstill, the bus in command; and no fault.
+        ensure!(master.read(0x2100, 2)? == [0, 0x2500], "{title}");
+        ensure!(master.board.resets.is_empty(), "{title}");
+        replayed += 1;
+    }
+    ensure!(replayed == 5, "{replayed}");
+    Ok(())
+}
+
 /// The answer begins within the bound after the request, its bytes have no gap that ends a frame, and the line is free
 /// again after it.
 #[test]
