@@ -6,7 +6,7 @@ use crate::error::cut;
 /// Most refused lines that are listed; a file with more of them is no backup for this drive.
 const MOST_REFUSED: usize = 20;
 
-/// What the user has to decide.
+/// The choice that the user has.
 const DECIDE: &str = "the other lines are staged, and the drive does not start: `apply rest` puts them in force, `revert` drops them";
 
 /// Sends the lines of a text as a backup, without empty lines and lines that begin with `#`; returns their number. Lines that the drive
