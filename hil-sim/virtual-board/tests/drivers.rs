@@ -192,29 +192,36 @@ fn the_dead_time_at_the_gates_is_the_longer_one() -> Result<()> {
 fn a_pin_that_is_released_is_where_its_resistors_hold_it() -> Result<()> {
     for stage in ALL {
         let strong = stage.driver.low.on_at_high;
+        let [[high_a, low_a], [high_b, low_b], [high_c, _]] =
+            stage.wiring.gates.map(|leg| leg.map(|gate| gate.0));
+        let port = |port: usize| GPIOA + 0x400 * port as u32;
         // OSSI = 0: without MOE the timer releases the pins; with the chip's pull-downs, then its pull-ups.
         for (pull, safe) in [(0, true), (2, strong), (1, strong)] {
             let mut script = Script::new(stage)?;
             let right = Setup::of(stage);
             script.timer(Setup { bdtr: right.bdtr & !(1 << 10), ..right })?;
             script.pins()?;
-            let mask = 0x3f_c000;
-            let result = script.modify(GPIOA + PUPDR, mask, 0x15_4000 * pull);
+            let result = [low_a, high_a, high_b, high_c].into_iter().try_for_each(|(at, pin)| {
+                script.modify(port(at) + PUPDR, 3 << (2 * pin), pull << (2 * pin))
+            });
             let name = stage.name;
             assert_eq!(result.is_ok(), safe, "{name}, pull {pull}: {result:?}");
             assert_eq!(script.board.gates().any_on(), !safe);
         }
         // A pin of another peripheral has no known level.
         let mut script = Script::new(stage)?;
-        script.modify(GPIOA + 0x20, 0xf << 28, 2 << 28)?;
-        let seen = violation(script.modify(GPIOA + MODER, 0xc000, 0x8000));
+        let (at, pin) = low_a;
+        let shift = 4 * (pin % 8);
+        script.modify(port(at) + 0x20 + 4 * (pin / 8), 0xf << shift, 2 << shift)?;
+        let seen = violation(script.modify(port(at) + MODER, 3 << (2 * pin), 2 << (2 * pin)));
         assert!(is(&seen, BadGates::OnWhileOff { leg: 0, side: 1, undefined: true }), "{seen}");
         // A pin that software drives to the level that switches the gate on.
         let mut script = Script::new(stage)?;
         let level = if stage.driver.low.on_at_high { 1 } else { 0 };
-        script.write(GPIOB + ODR, 1 - level)?;
-        script.modify(GPIOB + MODER, 3, 1)?;
-        let seen = violation(script.write(GPIOB + ODR, level));
+        let (at, pin) = low_b;
+        script.write(port(at) + ODR, (1 - level) << pin)?;
+        script.modify(port(at) + MODER, 3 << (2 * pin), 1 << (2 * pin))?;
+        let seen = violation(script.write(port(at) + ODR, level << pin));
         assert!(is(&seen, BadGates::OnWhileOff { leg: 1, side: 1, undefined: false }), "{seen}");
     }
     Ok(())

@@ -8,7 +8,6 @@ use virtual_board::{Board, Image, Options, PowerStage};
 const RCC_AHB2ENR: u32 = 0x4002_104c;
 const RCC_APB2ENR: u32 = 0x4002_1060;
 pub const GPIOA: u32 = 0x4800_0000;
-pub const GPIOB: u32 = 0x4800_0400;
 const GPIOC: u32 = 0x4800_0800;
 pub const TIM1: u32 = 0x4001_2c00;
 const ADC1: u32 = 0x5000_0000;
