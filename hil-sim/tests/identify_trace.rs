@@ -26,7 +26,18 @@ const MOTOR: MachineSettings = MachineSettings {
     lm: 0.1289,
     ..MachineSettings::DEFAULT
 };
-/// The transient inductance of the circuit above, H.
+/// A motor with an L_s of 169.4 mH, and its four parameters.
+const MILL: MachineSettings = MachineSettings {
+    rs: 2.448,
+    rr: 1.5456,
+    lls: 0.0075,
+    llr: 0.0075,
+    lm: 0.1619,
+    ..MachineSettings::DEFAULT
+};
+const MILL_PARAMETERS: [(&str, f64); 4] =
+    [("r_s_ohm", 2.448), ("tau_r_s", 0.1096), ("sigma_l_s_mh", 14.67), ("l_s_mh", 169.4)];
+/// The transient inductance of the first motor, H.
 const SIGMA_L_S: f64 = 0.01598;
 const RATES: [f64; 4] = [2000.0, 5000.0, 10_000.0, 20_000.0];
 
@@ -107,8 +118,50 @@ fn written(folder: &Path, name: &str, rows: &[Row]) -> PathBuf {
     path
 }
 
+/// Distance of the channels of [`scanned`], s.
+const SKEW_S: f64 = 11.55e-6;
+
+/// Records a motor of a mill on 208 V, 60 Hz with cuts, at 8 kHz: six channels are sampled one after another. The
+/// voltages are those of the phases, or from line to line.
+fn scanned(folder: &Path, lines: bool) -> PathBuf {
+    let machine = EnergyMachine::new(&MILL, &IronSettings::LINEAR).expect("a machine");
+    let shaft = MechanicsSettings { inertia: 0.02, ..Default::default() };
+    let mut motor = MotorModel::new(machine, Mechanics::new(&shaft).expect("a shaft"));
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(9);
+    let v = |t: f64| {
+        let of = |volt, turns: f64| Complex::from_polar(volt, TAU * 60.0 * turns * t);
+        of(169.8, 1.0) + of(3.0, -5.0)
+    };
+    let mut text = "time_s,u_a_v,u_b_v,u_c_v,i_a_a,i_b_a,i_c_a,speed_rpm\n".to_owned();
+    if lines {
+        text = text.replace("u_a_v,u_b_v,u_c_v", "u_ab_v,u_bc_v,u_ca_v");
+    }
+    for row in 0..16_000 {
+        let t = f64::from(row) / 8000.0;
+        let cut = if row > 8000 && (row / 2000) % 2 == 0 { 6.0 } else { 0.5 };
+        motor.mechanics.set_load(Load::Free { torque: cut }).expect("a load");
+        let (mut cells, speed) = (Vec::new(), motor.state.speed * 60.0 / TAU);
+        for channel in 0..6 {
+            let at = t + f64::from(channel) * SKEW_S;
+            let (n, u) = (channel as usize % 3, phases(v(at)));
+            cells.push(match channel {
+                0..3 if lines => u[n] - u[(n + 1) % 3],
+                0..3 => u[n],
+                _ => phases(motor.state.electrical.current())[n] + noise(&mut random, 0.02).re,
+            });
+            let step = if channel < 5 { SKEW_S } else { 125e-6 - 5.0 * SKEW_S };
+            (0..3).for_each(|k| motor.step(v(at + (f64::from(k) + 0.5) * step / 3.0), step / 3.0));
+        }
+        let cells = cells.iter().map(|cell| format!("{cell:.4}")).collect::<Vec<_>>().join(",");
+        writeln!(text, "{t:.6},{cells},{speed:.3}").unwrap();
+    }
+    let path = folder.join(format!("mill-{lines}.csv"));
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
 fn reading(voltages: Voltages) -> Reading {
-    Reading { columns: Vec::new(), voltages, delay: None, drop_v: None, times: [None; 2] }
+    Reading::of(voltages)
 }
 
 fn identified(path: &Path, reading: &Reading) -> Result<Outcome, String> {
@@ -154,11 +207,28 @@ fn resistance_leakage_and_drop_are_found_at_each_rate_and_supply() {
 fn a_record_that_does_not_tell_the_motor_is_refused_by_name() {
     let folder = folder("identify-refused");
     let mains = |load| on_the_mains(&IronSettings::LINEAR, 5000.0, load, 7);
-    let mut radians = mains(steps());
-    radians.iter_mut().for_each(|row| row.3 *= TAU / 60.0);
+    let of_speed = |factor: f64| {
+        let rows = mains(steps()).into_iter();
+        rows.map(|(t, v, i, rpm)| (t, v, i, factor * rpm)).collect::<Vec<Row>>()
+    };
+    let mut outliers = of_speed(1.0);
+    outliers[200].3 = 41_967.0;
+    outliers[900].3 = 195.0;
+    let mut lines = of_speed(1.0);
+    lines.iter_mut().for_each(|row| row.1 *= Complex::new(1.5, 0.75_f64.sqrt()));
     for (name, rows, why) in [
         ("locked.csv", mains([Load::Locked; 2]), "the shaft does not turn"),
-        ("radians.csv", radians, "the speed looks like rad/s"),
+        ("radians.csv", of_speed(TAU / 60.0), "the speed seems to be in rad/s"),
+        ("turns.csv", of_speed(1.0 / 60.0), "the speed seems to be in turns per second"),
+        (
+            "sense.csv",
+            of_speed(-1.0),
+            "with 2 pole pairs is -48.5 Hz; the speed seems to be of opposite sign",
+        ),
+        ("electrical.csv", of_speed(2.0), "electrical, or the motor has 1 pole pair"),
+        ("pairs.csv", of_speed(2.0 / 3.0), "that of a motor with 3 pole pairs"),
+        ("outliers.csv", outliers, "line 202: speed_rpm = 41967 is an outlier"),
+        ("lines.csv", lines, "look like those from line to line: call them u_ab_v"),
         (
             "idle.csv",
             mains([steps()[0]; 2]),
@@ -168,6 +238,44 @@ fn a_record_that_does_not_tell_the_motor_is_refused_by_name() {
         let path = written(&folder, name, &rows);
         let error = identified(&path, &reading(Voltages::Sampled)).expect_err(name);
         assert!(error.contains(name) && error.contains(why), "{error}");
+    }
+}
+
+/// With the skew of the channels the motor is found; without it, the deviations contain its effect.
+#[test]
+fn channels_may_be_sampled_one_after_another_and_from_line_to_line() {
+    let folder = folder("identify-skew");
+    let sampled = reading(Voltages::Sampled);
+    let of = |path: &Path, skew_s: Option<f64>| {
+        let times = [Some(0.8), None];
+        let reading = Reading { skew_s, times, ..sampled.clone() };
+        identified(path, &reading)
+    };
+    let [phases, lines] = [false, true].map(|lines| scanned(&folder, lines));
+    let [known, unknown, at_once, from_lines] =
+        [(&phases, Some(SKEW_S)), (&phases, None), (&phases, Some(0.0)), (&lines, Some(SKEW_S))]
+            .map(|(path, skew_s)| of(path, skew_s).expect("a motor"));
+    assert!(unknown.remarks[0].contains("sampled one after another, 20.8 µs apart"));
+    let mut outside = 0;
+    for (name, truth) in MILL_PARAMETERS {
+        let value = |outcome: &Outcome, name: &str| outcome.metrics.get(name).expect(name);
+        let found = value(&known, name);
+        assert!((found / truth - 1.0).abs() < 0.03, "{name}: {found}, true {truth}");
+        assert!((value(&from_lines, name) / found - 1.0).abs() < 0.005, "{name}");
+        let (stem, unit) = name.rsplit_once('_').expect("a unit");
+        let deviation = format!("{stem}_deviation_{unit}");
+        let off = (value(&unknown, name) - truth).abs();
+        assert!(off < value(&unknown, &deviation), "{name}: off by {off}");
+        outside += u32::from(off > 3.0 * value(&at_once, &deviation));
+    }
+    // Channels that are said to be sampled at once: the error exceeds the statistical deviation by far.
+    assert!(outside > 1, "{outside}");
+    for (reading, why) in [
+        (Reading { skew_s: Some(26e-6), ..sampled.clone() }, "--skew 26.00: with 6 channels"),
+        (Reading { skew_s: Some(1e-6), ..reading(Voltages::Mean) }, "needs --voltages sampled"),
+    ] {
+        let error = identified(&phases, &reading).expect_err(why);
+        assert!(error.contains(why), "{error}");
     }
 }
 
@@ -189,7 +297,7 @@ fn rows_are_chosen_and_phases_need_not_sum_to_zero() {
     let by_time = identified(&path, &from(0.1)).expect("a motor");
     assert!((by_time.metrics.get("r_s_ohm").unwrap() / MOTOR.rs - 1.0).abs() < 0.02);
     let remarks = by_time.remarks.join("\n");
-    assert!(remarks.contains("u_c_v and the others have 2.1 % of phase a in common"), "{remarks}");
+    assert!(remarks.contains("u_c_v and the others have 2.1 % of u_a_v in common"), "{remarks}");
     assert!(remarks.contains("No i_c_a: taken as −a −b"), "{remarks}");
     let error = identified(&path, &from(0.69)).unwrap_err();
     assert!(error.contains("51 rows; at least 100 are needed"), "{error}");
@@ -207,6 +315,10 @@ fn rows_are_chosen_and_phases_need_not_sum_to_zero() {
         let error = identified(&other, &sampled).expect_err(why);
         assert!(error.contains(why) && error.len() < 250, "{error}");
     }
+    let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    std::fs::write(&path, [&[0xff, 0xfe], &wide[..]].concat()).unwrap();
+    let error = identified(&path, &sampled).unwrap_err();
+    assert!(error.contains("UTF-16 text; save the file as CSV in UTF-8"), "{error}");
 }
 
 /// A record whose voltage was reduced by more than the inverter voltage error.

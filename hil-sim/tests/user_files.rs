@@ -77,7 +77,10 @@ fn a_simulated_trace_is_identified() {
     let arguments = ["identify-trace", "--input", "c.csv", "--column", "speed_rpm=n"];
     let output = hil_sim(&folder, &arguments);
     assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("c.csv: there is no column `u_alpha_v`; the file has: "));
+    assert!(
+        text(&output.stderr)
+            .contains("c.csv: there is no column `u_alpha_v or u_a_v or u_ab_v`; the file has: ")
+    );
     let more = ["--column", "u_alpha_v=ua", "--set", "motor.r_s=4"];
     let output = hil_sim(&folder, &[&arguments[..], &more].concat());
     let printed = text(&output.stdout);

@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 use crate::bounded;
 use crate::error::{Error, cut, unknown};
 
+/// Likely cause if the first row after the header cannot be read.
+const PREAMBLE: &str = "; if the instrument wrote lines before the names of the columns, remove them or begin them with #";
+
 /// Named columns of equal length.
 #[derive(Debug)]
 pub struct Columns {
@@ -22,11 +25,11 @@ impl Columns {
     /// [`Error::Data`] with the line of a cell that is not a finite number, or of a row with another width than the header.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let failed = |line, problem: String| Error::data(path, line, problem);
-        let of_csv = |error: csv::Error| {
+        let of_csv = |error: csv::Error, hint: &str| {
             let line = error.position().map(csv::Position::line);
             let problem = match error.kind() {
                 csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-                    format!("{len} cells; the header has {expected_len}")
+                    format!("{len} cells; the header has {expected_len}{hint}")
                 }
                 _ => "no UTF-8 text".to_owned(),
             };
@@ -36,9 +39,12 @@ impl Columns {
         let builder = builder.trim(csv::Trim::All).comment(Some(b'#'));
         let bytes = bounded::bytes(path, bounded::TABLE_MIB);
         let bytes = bytes.map_err(|why| failed(None, why.to_string()))?;
+        if [[0xff, 0xfe], [0xfe, 0xff]].iter().any(|mark| bytes.starts_with(mark)) {
+            return Err(failed(None, "UTF-16 text; save the file as CSV in UTF-8".to_owned()));
+        }
         let mut reader = builder.from_reader(&bytes[..]);
-        let names: Vec<String> =
-            reader.headers().map_err(of_csv)?.iter().map(str::to_owned).collect();
+        let header = reader.headers().map_err(|error| of_csv(error, ""))?;
+        let names: Vec<String> = header.iter().map(str::to_owned).collect();
         let line = cut(&names.join(", "));
         if names.len() == 1 && line.contains([';', '\t']) {
             return Err(failed(Some(1), format!("`{line}`: the separator must be a comma")));
@@ -51,11 +57,13 @@ impl Columns {
         }
         let mut rows = Vec::new();
         for record in reader.records() {
-            let record = record.map_err(of_csv)?;
+            let hint = if rows.is_empty() { PREAMBLE } else { "" };
+            let record = record.map_err(|error| of_csv(error, hint))?;
             let line = record.position().map_or(0, csv::Position::line);
             let number = |(cell, name): (&str, &String)| {
                 let number = cell.parse().ok().filter(|number: &f64| number.is_finite());
-                let problem = || format!("{} = `{}` is not a finite number", cut(name), cut(cell));
+                let [name, cell] = [name, cell].map(cut);
+                let problem = || format!("{name} = `{cell}` is not a finite number{hint}");
                 number.ok_or_else(|| failed(Some(line), problem()))
             };
             rows.push((line, record.iter().zip(&names).map(number).collect::<Result<_, _>>()?));
@@ -73,9 +81,14 @@ impl Columns {
         self.rows.is_empty()
     }
 
+    /// Returns the place of a column in the file, counted from 0, if there is one of this name.
+    pub fn place(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|known| known == name)
+    }
+
     /// Returns the column of this name, if there is one.
     pub fn get(&self, name: &str) -> Option<Vec<f64>> {
-        let place = self.names.iter().position(|known| known == name)?;
+        let place = self.place(name)?;
         Some(self.rows.iter().map(|(_, row)| row[place]).collect())
     }
 
@@ -84,10 +97,13 @@ impl Columns {
     /// # Errors
     /// [`Error::Data`] with the names of the columns of the file.
     pub fn need(&self, name: &str) -> Result<Vec<f64>, Error> {
-        self.get(name).ok_or_else(|| {
-            let (name, names) = (cut(name), cut(&self.names.join(", ")));
-            self.error(format!("there is no column `{name}`; the file has: {names}"))
-        })
+        self.get(name).ok_or_else(|| self.missing(name))
+    }
+
+    /// Returns the error of a missing column, with the names of the columns of the file.
+    pub fn missing(&self, name: &str) -> Error {
+        let (name, names) = (cut(name), cut(&self.names.join(", ")));
+        self.error(format!("there is no column `{name}`; the file has: {names}"))
     }
 
     /// Checks that every column has one of these names.

@@ -1,23 +1,17 @@
 //! Identification of the motor from a recorded trace of a drive: voltages, currents and speed in a CSV file.
 
-use std::path::Path;
+mod file;
 
-use drive_settings::words;
-use sim_bench::columns::Columns;
-use sim_bench::error::{cut, unknown};
-use sim_bench::plant::clarke;
+use std::path::Path;
 
 use crate::identification::output_error::{OutputErrorFit, Record};
 use crate::identification::{Complex, NotIdentifiable, Parameters};
 use crate::prelude::*;
 
-const TIME: &str = "time_s";
-const SPEED: &str = "speed_rpm";
-/// Columns of voltages and currents, as vectors or per phase. The third phase may be absent.
-const VECTORS: [&[&str]; 2] = [&["u_alpha_v", "u_beta_v"], &["i_alpha_a", "i_beta_a"]];
-const PHASES: [&[&str]; 2] = [&["u_a_v", "u_b_v", "u_c_v"], &["i_a_a", "i_b_a", "i_c_a"]];
-/// Largest relative difference of two sampling periods.
-const JITTER: f64 = 0.01;
+use file::LINE_TO_PHASE;
+pub(crate) use file::{Contents, read};
+pub use file::{Reading, Voltages};
+
 /// Remark on an inverter voltage error at its bound.
 const BOUND: &str = "The inverter voltage error would be negative, which is impossible, so it is set to 0. Are the voltages those of the \
                      terminals (--voltages sampled or mean)?";
@@ -28,142 +22,18 @@ const STARTS: [f64; 3] = [1.0, 0.2, 5.0];
 const OPEN: f64 = 0.3;
 /// Residual, relative to the current, above which a remark mentions it.
 const REMARKED: f64 = 0.05;
-/// Common-mode part of the three phases, relative to phase a, above which a remark mentions it.
-const COMMON: f64 = 0.01;
 /// Smallest relative change of the current that a doubled rotor time constant must cause. With less, errors of the
 /// record of a few percent, such as harmonics and iron loss, exceed the information in the slip.
 const TOLD: f64 = 0.1;
-/// Share to which the residual must fall before the speed is taken for another quantity.
+/// Share to which the residual must fall before the voltages are taken for line-to-line voltages.
 const NEARER: f64 = 0.3;
-
-words! {
-    /// Kinds of the voltages in a record.
-    pub enum Voltages {
-        /// Voltages that a drive commands: held over a row, reduced by the inverter voltage error.
-        Commanded = "commanded",
-        /// Samples at the terminals, at the instants of the currents, joined by straight lines.
-        Sampled = "sampled",
-        /// Means at the terminals from one row to the next.
-        Mean = "mean",
-    }
-}
-
-/// The way in which a file is read.
-#[derive(Clone, Debug)]
-pub struct Reading {
-    /// Other names of columns, each `OURS=THEIRS`.
-    pub columns: Vec<String>,
-    /// The kind of its voltages.
-    pub voltages: Voltages,
-    /// Number of rows after the currents of a row at which its voltage acts. Unset: 0 for a voltage at the terminals;
-    /// for a commanded voltage, 1 and the delay of the current filter.
-    pub delay: Option<f64>,
-    /// Inverter voltage error, V. Unset: none for a voltage at the terminals, fitted for a commanded one.
-    pub drop_v: Option<f64>,
-    /// Times of the first and the last row, s; unset: all.
-    pub times: [Option<f64>; 2],
-}
-
-/// Returns our names of columns, each with the name in the file.
-fn renamed(mapping: &[String]) -> Result<Vec<(String, String)>, Error> {
-    let known = [&[&[TIME, SPEED][..]], &VECTORS[..], &PHASES].concat().concat();
-    let pair = |given: &String| {
-        let Some((ours, theirs)) = given.split_once('=') else {
-            let given = cut(given);
-            return Err(Error::Refused(format!(
-                "--column {given}: write OURS=THEIRS, for example --column speed_rpm=n"
-            )));
-        };
-        if !known.contains(&ours) {
-            let problem = unknown("column", ours, &known);
-            return Err(Error::Refused(format!("--column {}: {problem}", cut(given))));
-        }
-        Ok((ours.to_owned(), theirs.to_owned()))
-    };
-    mapping.iter().map(pair).collect()
-}
-
-/// Reads a record; also returns remarks about its file.
-pub(crate) fn read(
-    path: &Path,
-    reading: &Reading,
-    config: &Config,
-) -> Result<(Record, Vec<String>), Error> {
-    let (renamed, columns) = (renamed(&reading.columns)?, Columns::read(path)?);
-    let name = |ours: &'static str| {
-        renamed.iter().find(|(known, _)| known == ours).map_or(ours, |(_, theirs)| theirs)
-    };
-    let (all, [from, to]) = (columns.need(name(TIME))?, reading.times);
-    let first = from.map_or(0, |from| all.partition_point(|time| *time < from));
-    let end = to.map_or(all.len(), |to| all.partition_point(|time| *time <= to)).max(first);
-    let column = |ours| columns.need(name(ours)).map(|all| all[first..end].to_vec());
-    if end - first < 100 {
-        return Err(columns.error(format!("{} rows; at least 100 are needed", end - first)));
-    }
-    let time = column(TIME)?;
-    let h = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
-    let off = |row: &usize| h <= 0.0 || (time[*row] - time[row - 1] - h).abs() > JITTER * h;
-    if let Some(row) = (1..time.len()).find(off) {
-        let step = time[row] - time[row - 1];
-        let problem = format!(
-            "time_s is {step} s after the row before; the rows must be {h} s apart, within 1 %"
-        );
-        return Err(columns.at(first + row + 1, problem));
-    }
-    let has = |ours| columns.get(name(ours)).is_some();
-    let are_phases = !has(VECTORS[0][0]) && has(PHASES[0][0]);
-    let (mut remarks, measured) = (Vec::new(), reading.voltages != Voltages::Commanded);
-    let mut vectors = |given: usize| -> Result<Vec<Complex>, Error> {
-        if !are_phases {
-            let [re, im] = [0, 1].map(|n| column(VECTORS[given][n]));
-            return Ok(re?.into_iter().zip(im?).map(|(re, im)| Complex::new(re, im)).collect());
-        }
-        let [a, b, c] = [0, 1, 2].map(|n| column(PHASES[given][n]));
-        let (a, b, third) = (a?, b?, c.is_ok());
-        let c = c.unwrap_or_else(|_| a.iter().zip(&b).map(|(a, b)| -a - b).collect());
-        let of = |k: usize| [a[k], b[k], c[k]];
-        let sum: Vec<f64> = (0..a.len()).map(|k| of(k).iter().sum::<f64>() / 3.0).collect();
-        let square = |of: &[f64]| of.iter().map(|x| x * x).sum::<f64>();
-        let common = (square(&sum) / square(&a)).sqrt();
-        let last = PHASES[given][2];
-        if !third && measured {
-            remarks.push(format!("No {last}: taken as −a −b; the three need not sum to zero."));
-        } else if common > COMMON {
-            remarks.push(format!(
-                "{last} and the others have {:.1} % of phase a in common, which is ignored: a reference other than the star point, \
-                 an offset, or another scale.",
-                100.0 * common
-            ));
-        }
-        Ok((0..a.len()).map(|k| clarke(of(k))).collect())
-    };
-    let (v, i) = (vectors(0)?, vectors(1)?);
-    let age = 1.0 + f64::from(config.drive.current_age_s()) / h;
-    let delay = reading.delay.unwrap_or(if measured { 0.0 } else { age });
-    let to_rad_s = TAU / 60.0 * f64::from(config.motor.pole_pairs);
-    // The mean of the row.
-    let mut omega_m: Vec<f64> = column(SPEED)?.into_iter().map(|rpm| rpm * to_rad_s).collect();
-    (1..omega_m.len()).for_each(|k| omega_m[k - 1] = 0.5 * (omega_m[k - 1] + omega_m[k]));
-    let (v, sampled) = (delayed(&v, delay), reading.voltages == Voltages::Sampled);
-    let v = if sampled { curved(&v) } else { v };
-    Ok((Record { h, v, sampled, i, omega_m }, remarks))
-}
-
-/// Delays a signal by some samples, with straight lines between them; beyond its ends it has the first and the last value.
-fn delayed(signal: &[Complex], samples: f64) -> Vec<Complex> {
-    let at = |k: f64| signal[(k.max(0.0) as usize).min(signal.len() - 1)];
-    let late =
-        |k: f64| at(k.floor()) * (1.0 - k + k.floor()) + at(k.floor() + 1.0) * (k - k.floor());
-    (0..signal.len()).map(|k| late(k as f64 - samples)).collect()
-}
-
-/// Returns samples whose straight connection has the integral of a smooth line through the given ones: otherwise a sine
-/// of 40 samples would be 0.2 % too small.
-fn curved(v: &[Complex]) -> Vec<Complex> {
-    let mut curved = v.to_vec();
-    (1..v.len() - 1).for_each(|k| curved[k] -= (v[k - 1] + v[k + 1] - v[k] * 2.0) / 12.0);
-    curved
-}
+/// Number of parts in which supply frequency and speed are compared, and largest relative difference in a match.
+const SPEEDS: usize = 20;
+const MATCH: f64 = 0.1;
+/// Share of the pull-out slip above which a motor does not run in most of a record.
+const RUNNING: f64 = 0.5;
+/// Largest number of pole pairs that is tried.
+const MOST_PAIRS: u32 = 6;
 
 /// Returns the machine of the settings, as its terminals show it.
 fn settings(config: &Config) -> Parameters {
@@ -220,18 +90,22 @@ fn fault(fit: &OutputErrorFit, current_a: f64) -> Option<String> {
 }
 
 /// Identifies the motor from a CSV file with the columns `time_s`, `speed_rpm`, and `u_alpha_v`, `u_beta_v`, `i_alpha_a`,
-/// `i_beta_a` or `u_a_v`, `u_b_v`, `u_c_v`, `i_a_a`, `i_b_a`, `i_c_a`, of which phase c may be absent.
+/// `i_beta_a` or `u_a_v`, `u_b_v`, `u_c_v`, `i_a_a`, `i_b_a`, `i_c_a`, of which phase c may be absent, or the line-to-line
+/// voltages `u_ab_v`, `u_bc_v`, `u_ca_v`.
 ///
 /// # Errors
 /// [`Error::Data`] with the line; [`Error::Refused`] for a wrong mapping, and if the record does not determine the
 /// motor, with the likely reason.
 pub fn identify(path: &Path, reading: &Reading, config: &Config) -> Result<Outcome, Error> {
-    let (record, mut remarks) = read(path, reading, config)?;
+    let Contents { record, mut remarks, channels } = read(path, reading, config)?;
     let refused = |why: String| {
         let path = path.display();
         Error::Refused(format!("{path}: the record does not determine the motor: {why}"))
     };
     let expected = settings(config);
+    if let Some(why) = misread_speed(&record, &expected, config.motor.pole_pairs) {
+        return Err(refused(why));
+    }
     // In electrical radians: an offset of the speed does not count as rotation.
     let speed = (record.omega_m.iter().map(|w| w * w).sum::<f64>() / record.i.len() as f64).sqrt();
     if speed * record.h * (record.i.len() as f64) < TAU {
@@ -241,28 +115,75 @@ pub fn identify(path: &Path, reading: &Reading, config: &Config) -> Result<Outco
     let terminals = reading.voltages != Voltages::Commanded;
     let drop_v = reading.drop_v.or(terminals.then_some(0.0));
     let nearest = |record: &Record| nearest_machine(record, &expected, drop_v);
-    let (current_a, fit) =
+    let (current_a, mut fit) =
         (rms(&record.i), nearest(&record).map_err(|why| refused(why.to_string()))?);
-    let Some(why) = fault(&fit, current_a) else {
-        if drop_v.is_none() && fit.drop_v == 0.0 {
-            remarks.push(BOUND.to_owned());
+    if let Some(why) = fault(&fit, current_a) {
+        let v = record.v.iter().map(|v| v / LINE_TO_PHASE).collect();
+        let lines = nearest(&Record { v, ..record });
+        let are_lines = lines.is_ok_and(|it| it.residual_a < NEARER * fit.residual_a);
+        let hint =
+            "; the voltages look like those from line to line: call them u_ab_v, u_bc_v, u_ca_v";
+        return Err(refused(why + if are_lines { hint } else { "" }));
+    }
+    if drop_v.is_none() && fit.drop_v == 0.0 {
+        remarks.push(BOUND.to_owned());
+    }
+    if channels > 0 {
+        let skew_s = record.h / channels as f64;
+        let skewed = Reading { skew_s: Some(skew_s), ..reading.clone() };
+        let other = read(path, &skewed, config)?.record.fit(&fit.parameters, drop_v);
+        let other = other.map_err(|why| refused(format!("with another skew: {why}")))?;
+        let [here, there] = [&fit, &other].map(|fit| fit.parameters.array());
+        for n in 0..4 {
+            fit.deviations[n] = fit.deviations[n].hypot(there[n] - here[n]);
         }
-        return Ok(outcome(&record, &fit, &expected, remarks, config));
+        remarks.push(format!(
+            "Whether the {channels} channels were sampled at once is not known. ± contains the change if they were sampled one after \
+             another, {:.1} µs apart. If you know their distance, give it with --skew; 0 is at once.",
+            1e6 * skew_s
+        ));
+    }
+    Ok(outcome(&record, &fit, &expected, remarks, config))
+}
+
+/// Returns how the speed looks if its slip is that of a motor about to stall and another unit, sense or number of pole pairs
+/// agrees with the supply frequency.
+fn misread_speed(record: &Record, machine: &Parameters, pole_pairs: u32) -> Option<String> {
+    let rows = record.i.len().div_ceil(SPEEDS);
+    let parts = record.i.chunks(rows).zip(record.omega_m.chunks(rows));
+    let speeds: Vec<[f64; 2]> = parts
+        .map(|(i, omega_m)| {
+            let turn: Complex = i.windows(2).map(|pair| pair[0].conj() * pair[1]).sum();
+            [turn.arg() / record.h, omega_m.iter().sum::<f64>() / omega_m.len() as f64]
+        })
+        .collect();
+    let mut slips: Vec<f64> = speeds.iter().map(|[supply, speed]| (supply - speed).abs()).collect();
+    slips.sort_by(f64::total_cmp);
+    let pull_out = machine.l_s / machine.sigma_l_s / machine.tau_r;
+    if slips[slips.len() / 2] < RUNNING * pull_out {
+        return None;
+    }
+    let sum = |n: usize| speeds.iter().map(|pair| pair[0] * pair[n]).sum::<f64>();
+    let (share, supply) = (sum(1) / sum(0), (sum(0) / speeds.len() as f64).sqrt());
+    let of_pairs = |pairs: u32| match pairs {
+        1 => "electrical, or the motor has 1 pole pair".to_owned(),
+        _ => format!("that of a motor with {pairs} pole pairs"),
     };
-    let pairs = f64::from(config.motor.pole_pairs);
-    let read_as = [
-        (60.0 / TAU, "rad/s"),
-        (60.0, "turns per second"),
-        (1.0 / pairs, "electrical"),
-        (-1.0, "of opposite sign"),
+    let units = [
+        (60.0 / TAU, "in rad/s"),
+        (60.0, "in turns per second"),
+        (-1.0, "of opposite sign, or two phases are exchanged"),
     ];
-    let other = read_as.iter().find(|(factor, _)| {
-        let omega_m = record.omega_m.iter().map(|w| w * factor).collect();
-        let other = Record { omega_m, ..record.clone() };
-        nearest(&other).is_ok_and(|it| it.residual_a < NEARER * fit.residual_a)
-    });
-    let hint = other.map(|(_, what)| format!("; the speed looks like {what}: then it fits"));
-    Err(refused(why + &hint.unwrap_or_default()))
+    let units = units.map(|(factor, what)| (factor, what.to_owned())).into_iter();
+    let pairs = (1..=MOST_PAIRS).map(|n| (f64::from(n) / f64::from(pole_pairs), of_pairs(n)));
+    let apart = |factor: f64| (factor * share - 1.0).abs();
+    let nearest = units.chain(pairs).min_by(|a, b| apart(a.0).total_cmp(&apart(b.0)));
+    let (_, what) = nearest.filter(|(factor, _)| apart(*factor) < MATCH)?;
+    let [supply_hz, speed_hz] = [supply, share * supply].map(|speed| speed / TAU);
+    Some(format!(
+        "the current rotates at {supply_hz:.1} Hz, and the speed with {pole_pairs} pole pairs is {speed_hz:.1} Hz; the speed seems \
+         to be {what}"
+    ))
 }
 
 fn outcome(
@@ -283,7 +204,7 @@ fn outcome(
     ];
     let share = fit.residual_a / rms(&record.i);
     let mut table = Table::new("Identified motor", &[]).note(format!(
-        "{} rows of {:.1} µs. ±: standard deviation between parts of the record; errors of the scale of voltage, current or speed are \
+        "{} rows of {:.1} µs. ±: standard deviation between parts of the record, and the effect of an unknown skew; errors of the scale of voltage, current or speed are \
          not included. Residual: {:.1} % of the current. Settings: {}.",
         record.i.len(),
         1e6 * record.h,

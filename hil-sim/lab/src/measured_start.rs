@@ -2,7 +2,7 @@
 
 use sim_bench::plant::IronSettings;
 
-use crate::identify_trace::{Reading, Voltages, read, rms};
+use crate::identify_trace::{Contents, Reading, Voltages, read, rms};
 use crate::prelude::*;
 
 /// Parts of a start, with their ends, s: the largest currents occur in the first.
@@ -19,10 +19,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (config, file) = (context.config, context.file);
     let path =
         file.ok_or_else(|| Error::Refused("measured-start needs --input FILE".to_owned()))?;
-    let voltages = Voltages::Sampled;
-    let all =
-        Reading { columns: Vec::new(), voltages, delay: None, drop_v: None, times: [None; 2] };
-    let (record, remarks) = read(path, &all, config)?;
+    let Contents { record, remarks, .. } = read(path, &Reading::of(Voltages::Sampled), config)?;
     let mut plant = plant_settings(config);
     let iron = plant.iron.unwrap_or(IronSettings::LINEAR);
     let machine = EnergyMachine::new(&plant.machine, &iron).map_err(Error::refused)?;

@@ -68,6 +68,10 @@ pub struct Trace {
     /// Inverter voltage error at each phase current [default: 0; commanded: fitted]
     #[arg(long, value_name = "V", value_parser = |text: &str| within(text, 0.0, 100.0, "V"), allow_negative_numbers = true)]
     drop: Option<f64>,
+    /// Time between two channels that were sampled one after another, in the order of their columns; 0: all at once
+    /// [default: not known]
+    #[arg(long, value_name = "US", value_parser = |text: &str| within(text, 0.0, 1000.0, "µs"), allow_negative_numbers = true)]
+    skew: Option<f64>,
     /// Passport of the identified motor, with nameplate and dc link of --motor
     #[arg(long, value_name = "FILE.json", requires = "motor")]
     passport: Option<PathBuf>,
@@ -260,9 +264,9 @@ fn say_on_interrupt(path: &Path, all: usize) -> Result<(), Error> {
 /// As [`trace::identify`], [`Input::config`]; [`Error::Write`].
 pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(), Error> {
     let config = input.config()?;
-    let Trace { voltages, delay, drop: drop_v, from, to, .. } = *given;
-    let (columns, times) = (given.columns.clone(), [from, to]);
-    let reading = trace::Reading { columns, voltages, delay, drop_v, times };
+    let Trace { voltages, delay, drop: drop_v, skew, from, to, .. } = *given;
+    let (columns, times, skew_s) = (given.columns.clone(), [from, to], skew.map(|us| 1e-6 * us));
+    let reading = trace::Reading { columns, voltages, delay, drop_v, times, skew_s };
     let outcome = trace::identify(&given.file, &reading, &config)?;
     if let Some(path) = &given.passport {
         passport::write(&passport::of_trace(&outcome, &config, &given.file), path)?;
@@ -272,7 +276,8 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
     if voltages != Voltages::Commanded {
         command.push_str(&format!(" --voltages {}", voltages.word()));
     }
-    for (name, value) in [("delay", delay), ("drop", drop_v), ("from", from), ("to", to)] {
+    let options = [("delay", delay), ("drop", drop_v), ("skew", skew), ("from", from), ("to", to)];
+    for (name, value) in options {
         command.extend(value.map(|value| format!(" --{name} {value}")));
     }
     for column in &given.columns {
