@@ -14,7 +14,7 @@ use crate::files::{copy, copy_as, files};
 use crate::results::outdated;
 use crate::sbom::Sbom;
 use crate::toolchain::{self, Target};
-use crate::{image, paths, python, run, tools, web};
+use crate::{fmu, image, paths, python, run, tools, web};
 
 /// The file of the check sums, in the form of `sha256sum`.
 const SUMS: &str = "SHA256SUMS";
@@ -73,6 +73,8 @@ pub fn dist(options: &Dist) -> Result<()> {
         }
         built.push(("induction-drive", run::TARGET, target));
         built.push(("drive-web", run::BROWSER, toolchain::compiler(run::BROWSER)?));
+        built.push(("induction-drive-fmu", &*host, Target::InUse));
+        copy(&fmu::build()?, &folder.join("fmu"))?;
         copy(&web::build()?, &folder.join("web"))?;
         copy(&tools::book()?, &folder.join("book"))?;
     }

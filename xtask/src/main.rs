@@ -6,6 +6,7 @@ mod by_name;
 mod dist;
 mod elf;
 mod files;
+mod fmu;
 mod foreign;
 mod fuzz;
 mod image;
@@ -105,6 +106,8 @@ enum Task {
     Web,
     /// Builds the wheel for Python into target/wheels and tests it in a clean environment. Installs maturin, numpy and more from PyPI
     Python,
+    /// Packs drive and motor as FMUs into target/fmu and tests them. Installs FMPy from PyPI
+    Fmu,
     /// Makes the folder of a release: images, programs, drive in a browser, book, lists of crates, licences, check sums
     Dist(dist::Dist),
     /// Long proofs in shards, which a later call continues. Without a name it lists them, and the results that are older than their inputs
@@ -166,6 +169,7 @@ fn run(task: Task) -> Result<()> {
         Task::Pages => by_name::pages(),
         Task::Web => web::build().map(drop),
         Task::Python => python::test(),
+        Task::Fmu => fmu::test(),
         Task::Dist(options) => dist::dist(&options),
         Task::Prove { name: None, .. } => prove::list(),
         Task::Prove { name: Some(name), part } => prove::prove(&name, &part),

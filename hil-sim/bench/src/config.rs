@@ -25,7 +25,7 @@ use drive_settings::rules::CARRIER_HZ;
 use drive_settings::{Settings, SettingsError, find, value};
 
 use file::FileAssignment;
-pub use key::{BenchKey, Key, check_model};
+pub use key::{BenchKey, Key, check_model, double};
 pub use keys::*;
 pub use plant::{current_lines, flux_level_a, open_phase, plant_settings};
 

@@ -191,7 +191,7 @@ fn reason(error: ValueError) -> &'static str {
 }
 
 /// Converts single to double precision so that both have the same shortest decimal fraction.
-fn double(number: f32) -> f64 {
+pub fn double(number: f32) -> f64 {
     number.to_string().parse().unwrap_or(number.into())
 }
 
