@@ -8,7 +8,7 @@ const make = (tag, attributes = {}, ...children) => {
 };
 
 // --- connection ---
-const token = new URLSearchParams(location.search).get('token');
+const query = new URLSearchParams(location.search), token = query.get('token');
 let socket, number = 0, hello = null, gone = 'connecting', answers = new Map(), listeners = [];
 
 /** A socket to the program that serves this page. A page without its token has drive and motor in a worker, which says and hears the same. */
@@ -67,11 +67,14 @@ function greet(now) {
   hello = now; gone = '';
   document.body.classList.toggle('is-simulated', /simulated/.test(now.version));
   $('who').textContent = `firmware ${now.version}; page ${now.program}`;
+  const link = (textContent, path) => [' · ', make('a', { textContent, href: now.project + path })];
+  $('links').replaceChildren(...link('project', ''), ...link('manual', '/blob/main/docs/README.md'), ...link('licence', '/blob/main/LICENSE-MIT'), ' (not public yet)');
   alarm('fit', now.misfit ? [now.misfit] : []);
   alarm('gone', []);
   if (fresh) signalsChoice();
   if (now.signals.length) restream();
   loadSettings();
+  if (fresh && !token && query.has('play')) play(`~learning; ~off; ${query.get('play')}`);
 }
 function lost(why) {
   gone = why;
@@ -95,6 +98,8 @@ const views = [...document.querySelectorAll('main > section')];
 // --- head ---
 // The last set-point of this page, by mode.
 let alarms = {}, present = '', asked = {};
+// Lines that have changed motor, load or sensors, by what they change.
+const altered = new Map();
 function alarm(name, lines) {
   alarms[name] = lines;
   const all = Object.values(alarms).filter(list => list.length);
@@ -111,6 +116,8 @@ function state(text) {
 }
 const NUMBERS = { torque: [/torque (-?[\d.]+) Nm/, 'Nm'], speed: [/speed (-?[\d.]+) rpm/, 'rpm'], current: [/i_q (-?[\d.]+)/, 'A'],
   link: [/dc link (-?[\d.]+) V/, 'V'], heat: [/heat sink (-?[\d.]+)/, '°C'], stator: [/stator (-?[\d.]+)/, '°C'] };
+/** A number without the sign of a zero. */
+const unsigned = text => text.replace(/^-(?=[0.]*$)/, '');
 function showStatus(line) {
   const now = line.split(';')[0];
   heardStatus = performance.now();
@@ -121,7 +128,7 @@ function showStatus(line) {
   state(now.replace(/ \(.*/, ''));
   for (const [id, [pattern, unit]] of Object.entries(NUMBERS)) {
     const found = line.match(pattern);
-    $(id).textContent = found ? `${found[1]} ${unit}` : '–';
+    $(id).textContent = found ? `${unsigned(found[1])} ${unit}` : '–';
   }
   $('limit').textContent = line.match(/limiting now, because: ([^;]*)/)?.[1] || '';
   $('limit').parentElement.hidden = !$('limit').textContent;
@@ -167,6 +174,10 @@ async function tell(line, to = say) {
   try {
     const lines = await ask(line), [word, value] = line.split(' ');
     if (/^(start|torque|speed|position)$/.test(word)) asked = { [value && word === 'start' ? value : word]: +value || 0 };
+    if (/^(torque|speed|position)$/.test(word)) $('reference').value = value;
+    for (const field of document.querySelectorAll('[data-line]')) if (line.startsWith(`${field.dataset.line} `)) field.value = line.slice(field.dataset.line.length + 1);
+    // A turned flux is an event, not a state.
+    if (line[0] === '!' && word !== '!turn') altered.set(word === '!sensor' ? word + value : word, line);
     to(lines.join(' ')); log(lines.join('\n'));
     return lines;
   }
@@ -233,6 +244,13 @@ function draw() {
   }
 }
 const unit = name => (u => SYMBOLS[u] || u)(name.match(/_([a-z]+)$/)?.[1] || '');
+const QUANTITIES = { phi: 'flux angle', flux: 'flux frequency', speed: 'speed', asked: 'set-point', i_d: 'd-axis current', i_q: 'q-axis current', v_d: 'd-axis voltage', v_q: 'q-axis voltage',
+  delta_i: 'current difference of the demodulation', dc_link: 'dc link', i_a: 'phase current a', i_b: 'phase current b', i_c: 'phase current c', heat_sink: 'heat sink', limit: 'limited by', turns: 'position' };
+/** A signal in words; without its unit, which stands at the axis. */
+const titled = name => {
+  const [, stem, ref] = name.match(/^(.*?)(_ref)?(?:_(?:a|v|hz|deg|nm|c|rpm|turns))?$/);
+  return (QUANTITIES[stem] || stem) + (ref ? ', reference' : '');
+};
 const inWords = (name, v) => v == null || Number.isNaN(v) ? '–' : !(name in WORDS) ? v.toPrecision(4) : v >= 100 ? `fault ${v - 100}` : WORDS[name][v];
 /** One plot a unit; they share the time axis below the last one, and the time at the cursor. */
 function buildPlots(into, names, group) {
@@ -248,7 +266,7 @@ function buildPlots(into, names, group) {
       scales: { x: { time: false } },
       axes: [{ ...axis, ...time }, { ...axis, label: u, labelSize: 18, size: 60 }],
       series: [{ label: 't', value: (_, v) => v == null ? '–' : `${v.toFixed(4)} s` }, ...indices.map(i => ({
-        label: names[i], stroke: COLOURS[i % 8], width: 1.5, dash: /_ref|asked/.test(names[i]) ? [6, 4] : undefined, value: (_, v) => inWords(names[i], v) }))],
+        label: titled(names[i]), stroke: COLOURS[i % 8], width: 1.5, dash: /_ref|asked/.test(names[i]) ? [6, 4] : undefined, value: (_, v) => inWords(names[i], v) }))],
     }, [[], ...indices.map(() => [])], into);
     return { plot, indices };
   });
@@ -260,8 +278,8 @@ function signalsChoice() {
   const usual = ['i_q_a', 'i_q_ref_a', 'i_d_a', 'speed_rpm', 'torque_nm', 'phi_deg'], names = hello.signals.toSorted((a, b) => ORDER.indexOf(a.unit) - ORDER.indexOf(b.unit)).map(({ signal }) => signal);
   let kept; try { kept = JSON.parse(localStorage.getItem('signals')).filter(name => names.includes(name)); } catch { kept = []; }
   $('signals').replaceChildren(...names.map(signal => make('label', {},
-    make('input', { type: 'checkbox', value: signal, checked: (kept.length ? kept : usual).includes(signal), onchange: restream }), ` ${signal}`)));
-  $('t-signal').replaceChildren(...names.map(signal => make('option', { textContent: signal })));
+    make('input', { type: 'checkbox', value: signal, checked: (kept.length ? kept : usual).includes(signal), onchange: restream }), ` ${titled(signal)}`)));
+  $('t-signal').replaceChildren(...names.map(signal => make('option', { textContent: titled(signal), value: signal })));
 }
 async function restream() {
   const names = chosen();
@@ -314,7 +332,7 @@ function drawFlux(angle, motor, psi) {
   if (on) arrow(angle, 138, style.getPropertyValue('--blue'), 2);
   const error = ((angle - motor + 1.5) % 1 - 0.5) * 360;
   $('flux-text').textContent = motor === undefined ? 'rotor flux: the estimate of the drive'
-    : `rotor flux: estimate (thin), motor (thick) ${psi.toFixed(2)} Wb${on && psi > 0.02 ? `, apart ${error.toFixed(1)}°` : ''}`;
+    : `rotor flux: estimate (thin), motor (thick) ${psi.toFixed(2)} Wb${on && psi > 0.02 ? `, apart ${unsigned(error.toFixed(1))}°` : ''}`;
 }
 
 // --- controls ---

@@ -253,6 +253,17 @@ $('steps').prepend(guide(BOARD));
 $('steps').append(...STEPS.map(guide));
 $('steps').firstChild.append(make('p', { id: 'reading', className: 'hint' }));
 
+const sayOfPassport = (text, bad) => { $('passport-said').textContent = text; $('passport-said').className = bad ? 'error' : ''; };
+/** The lines of commissioning and learning, and the answers that `hil-sim passport` reads beside them. */
+async function passportRecord() {
+  const lines = $('log').textContent.split('\n').filter(line => line.startsWith('* '));
+  for (const line of ['version', 'describe', 'learned']) lines.push(...await ask(line));
+  // The simulated drive has no image of its own.
+  if (!lines.some(line => line.includes(', image '))) lines.push(`${hello.version}, image of page ${hello.program}`);
+  return lines.join('\n') + '\n';
+}
+$('passport').onclick = () => passportRecord().then(text => download('motor.log', text), error => sayOfPassport(error.message, true));
+
 // --- a simulated motor ---
 /** Lines for drive and motor, one after the other. `~off` switches off first, `~STATE` waits for a state. */
 async function play(lines) {
@@ -261,11 +272,23 @@ async function play(lines) {
       if (line[0] !== '~') { await tell(line); continue; }
       if (line === '~off' && /^in fault/.test(present)) await tell('clear');
       else if (line === '~off' && !/^(off|learning)/.test(present)) await tell('stop');
-      // The state is five times a second old.
-      for (let n = 0; n < 50; n++) if (await seconds(0.25), present.startsWith(line.slice(1)) || /^in fault/.test(present)) break;
+      // The state is five times a second old. Learning takes its time.
+      for (let n = 0; n < 50; n += /^learning/.test(present) ? 0 : 1) if (await seconds(0.25), present.startsWith(line.slice(1)) || /^in fault/.test(present)) break;
     }
   } catch { /* told already */ }
 }
+/** An address that brings the drive of a page into the present state: with its seed, the lines that have changed the motor, and the set-point. */
+function address() {
+  const mode = regulated(), word = mode === 'vf' ? 'speed' : mode;
+  // A load acts on a drive that regulates: it would turn the shaft of one that is off.
+  const lines = [...(mode ? [`start ${mode}`, mode === 'vf' ? '~turning' : '~regulating'] : []), ...altered.values(), ...(mode ? [`${word} ${asked[word] || 0}`] : [])];
+  const state = new URLSearchParams({ seed: query.get('seed') || 1, ...(lines.length ? { play: lines.join('; ') } : {}) });
+  return `${location.origin}${location.pathname}?${state}`;
+}
+$('share').onclick = () => {
+  history.replaceState(null, '', address());
+  navigator.clipboard?.writeText(location.href).then(() => say('the address is in the clipboard'), () => say('the address stands above the page'));
+};
 document.querySelectorAll('[data-play]').forEach(button => { button.onclick = () => play(button.dataset.play); });
 document.querySelectorAll('[data-line]').forEach(field => { field.onchange = () => tell(`${field.dataset.line} ${field.value}`).catch(quiet); });
 $('around').onsubmit = event => event.preventDefault();

@@ -111,6 +111,12 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     std::thread::sleep(Duration::from_secs(4));
     state(&mut page, "regulating torque");
     pictures(&mut page, &folder, "web");
+    page.shape(390, 844, false);
+    assert_eq!(
+        page.value("scrollTo(0, 0); $('flux').getBoundingClientRect().bottom < innerHeight"),
+        true
+    );
+    page.shape(1280, 900, false);
     page.value("$('around').scrollIntoView({ block: 'end' })");
     pictures(&mut page, &folder, "web-motor");
     page.value("scrollTo(0, 0)");
@@ -139,6 +145,16 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     play(&mut page, "!open b");
     state(&mut page, "in fault");
 
+    // The record of the page is a passport of the motor, which the drive has learned before.
+    page.value("play('!open none; ~off; commission').then(() => 0); 0");
+    page.until("/commissioning: ended/.test($('log').textContent)", PATIENCE);
+    page.value("passportRecord().then(text => { globalThis.text = text; }); 0");
+    page.until("!!globalThis.text", PATIENCE);
+    let record = page.value("globalThis.text");
+    let passport = hil_sim::passport::of_console(record.as_str().unwrap()).unwrap();
+    let r_s = passport.measured.iter().find(|found| found.name == "r_s").unwrap().value;
+    assert!((r_s - 5.4).abs() < 0.1, "{r_s}");
+
     // As fast as the browser can, with the same bits as the same steps give here.
     page.value(&format!(
         "fetch('drive.wasm').then(file => file.arrayBuffer()).then(bytes => WebAssembly.instantiate(bytes, {{}})).then(({{ instance: {{ exports: own }} }}) => {{
@@ -156,6 +172,19 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     let longest = FIRST_PICTURE_MS * (QUIET / faster).max(1.0);
     assert!(first < longest, "{first} ms, {longest} here");
     assert!(faster > FASTER, "{faster}");
+
+    // The address of a state gives it to another page.
+    page.value(
+        "play('~off; !load free 0.4; start speed; ~regulating; speed 120').then(() => 0); 0",
+    );
+    number(&mut page, "speed", "> 110");
+    let shared = page.value("address()").as_str().unwrap().to_owned();
+    page.close();
+    let mut other = browser.open(&shared);
+    number(&mut other, "speed", "> 110");
+    state(&mut other, "regulating speed");
+    let shown = "[$('reference').value, $('around').querySelector('input').value, $('links').textContent].join()";
+    assert_eq!(other.value(shown), "120,0.4, · project · manual · licence (not public yet)");
 }
 
 /// The same board with `cargo live --simulated`, in real time.

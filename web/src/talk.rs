@@ -25,8 +25,8 @@ pub fn objects(lines: &[String]) -> Vec<Value> {
 pub fn hello(version: Option<&String>, described: &[Value], misfit: Option<String>) -> Value {
     let signals: Vec<&Value> =
         described.iter().filter(|object| object["signal"].is_string()).collect();
-    let program = env!("CARGO_PKG_VERSION");
-    json!({ "hello": { "version": version, "program": program, "signals": signals, "misfit": misfit } })
+    let [program, project] = [env!("CARGO_PKG_VERSION"), env!("CARGO_PKG_REPOSITORY")];
+    json!({ "hello": { "version": version, "program": program, "project": project, "signals": signals, "misfit": misfit } })
 }
 
 /// Most frames that wait for a slow page; the oldest are dropped first.
