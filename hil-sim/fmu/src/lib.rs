@@ -5,7 +5,7 @@
 //! |---|---|
 //! | [`model`] | the form of a model, and its variables |
 //! | [`drive`], [`motor`] | the two models, one control period at a time |
-//! | [`unit`] | an FMU in use: its model, its settings, its inputs and its time |
+//! | [`mod@unit`] | an FMU in use: its model, its settings, its inputs and its time |
 //! | [`interface`] | the functions of the standard |
 
 pub mod drive;
