@@ -243,17 +243,14 @@ impl Desk {
 
     fn dispatch(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         match order {
-            Order::Apply if !self.settings.is_staged() => {
-                self.end_backup(true).map(|()| Reply::NothingStaged)
-            }
-            Order::ApplyRest => {
-                self.left_out = 0;
-                self.dispatch(from, Order::Apply, drive)
+            Order::Apply | Order::ApplyRest if !self.settings.is_staged() => {
+                self.end_backup(&order).map(|()| Reply::NothingStaged)
             }
             Order::Start(_)
             | Order::Learn { .. }
             | Order::Commission(..)
             | Order::Apply
+            | Order::ApplyRest
             | Order::Save => self.design(from, order, drive),
             Order::Accept => self.accept(from, drive),
             Order::Stop(stop) => {
@@ -364,18 +361,19 @@ impl Desk {
         self.left_out = self.left_out.saturating_add(self.backup_of.is_some().into());
     }
 
-    /// Ends the backup that the console receives, because its lines are about to be put in force.
+    /// Ends the backup that the console receives, because `order` is about to put its lines in force.
     ///
     /// # Errors
-    /// The lines belong to another board, some of them were refused, or they may not be all: the last line of a backup `applies`.
-    fn end_backup(&mut self, applies: bool) -> Result<(), Refusal> {
+    /// The lines belong to another board, some of them were refused, or they may not be all: the last line of a backup applies them.
+    fn end_backup(&mut self, order: &Order) -> Result<(), Refusal> {
         self.is_own_board()?;
-        match self.left_out {
-            0 if applies || self.backup_of.is_none() => {}
-            0 => self.nothing_staged()?,
-            lines => return Err(Refusal::LeftOut(lines)),
+        match (self.left_out, order) {
+            (_, Order::ApplyRest) | (0, Order::Apply) => {}
+            (0, _) if self.backup_of.is_none() => {}
+            (0, _) => self.nothing_staged()?,
+            (lines, _) => return Err(Refusal::LeftOut(lines)),
         }
-        self.backup_of = None;
+        (self.backup_of, self.left_out) = (None, 0);
         Ok(())
     }
 
@@ -433,7 +431,7 @@ impl Desk {
             Order::Learn { .. } if !drive.is_off() => return self.start(Mode::Learning, drive),
             _ => must_be_off(drive)?,
         }
-        self.end_backup(order == Order::Apply)?;
+        self.end_backup(&order)?;
         if order.is_for_the_commander(Commander::Console) {
             self.is_own_record()?;
             if !self.settings.latest().board_is_confirmed() {
@@ -511,7 +509,9 @@ impl Desk {
     /// Completes a request whose settings are in force. The answer to [`Order::Apply`] takes these remarks.
     fn complete(&mut self, order: &Order, applied: Applied, drive: &mut impl DriveHandle) -> Done {
         let answer = match *order {
-            Order::Apply => return (Applied::default(), Ok(Reply::Applied(applied))),
+            Order::Apply | Order::ApplyRest => {
+                return (Applied::default(), Ok(Reply::Applied(applied)));
+            }
             Order::Start(mode) => self.start(mode, drive),
             Order::Learn { again: true } if self.settings.in_force().learned.is_none() => {
                 Err(Refusal::NothingLearned)
@@ -602,7 +602,7 @@ impl Desk {
     /// Puts the results of the commissioning in force, and saves them.
     fn accept(&mut self, from: Commander, drive: &mut impl DriveHandle) -> Answer {
         may_stage(drive)?;
-        self.end_backup(false)?;
+        self.end_backup(&Order::Accept)?;
         let found = drive.session().found(&self.settings.latest().drive);
         self.settings.stage(found.ok_or(Refusal::NothingFound)?);
         self.design(from, Order::Save, drive)
