@@ -44,9 +44,7 @@ pub const ALL_NAMES: &str = "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm02
 
 /// The board that this firmware is built for: `cargo firmware --board NAME`, by default the reference.
 pub const SELECTED: &Board = match option_env!("INDUCTION_DRIVE_BOARD") {
-    Some(name) => {
-        find(name).expect("INDUCTION_DRIVE_BOARD: no such board; src/boards.rs lists them")
-    }
+    Some(name) => find(name).expect("INDUCTION_DRIVE_BOARD: src/boards.rs lists the boards"),
     None => &reference::BOARD,
 };
 
@@ -306,10 +304,7 @@ impl Board {
     /// Number of signals at a pin. The debug port and a pin that must stay analog count as signals.
     const fn signals_at(&self, pin: Pin) -> usize {
         let Currents { a, b, shunts } = self.currents;
-        let c = match shunts {
-            Some(Shunts { c, .. }) => pin.times(&[c.pin]),
-            None => 0,
-        };
+        let c = if let Some(Shunts { c, .. }) = shunts { pin.times(&[c.pin]) } else { 0 };
         let bus = match self.bus {
             Some(Rs485 { transmit, receive, driver }) => pin.times(&[transmit, receive, driver]),
             None => 0,
@@ -371,13 +366,8 @@ const fn check(board: &Board) {
     }
     let mut i = 0;
     while i < 16 {
-        let most_is_one = board.signals_at(pa(i)) <= 1
-            && board.signals_at(pb(i)) <= 1
-            && board.signals_at(pc(i)) <= 1;
-        assert!(
-            most_is_one,
-            "two signals have the same pin, or a pin that must stay analog has one"
-        );
+        let most = board.signals_at(pa(i)) | board.signals_at(pb(i)) | board.signals_at(pc(i));
+        assert!(most <= 1, "two signals have the same pin, or a pin must stay analog");
         i += 1;
     }
     // Nominal dc link < braking limit <= maximum operating voltage < trip of the software < trip of the comparator <= voltages that

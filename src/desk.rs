@@ -49,7 +49,6 @@ struct Task {
 }
 
 /// The command arbiter, see the head of the module.
-#[derive(Default)]
 pub struct Desk {
     settings: Staging,
     /// Whether settings in force were changed since they were saved.
@@ -100,7 +99,32 @@ pub struct Desk {
 impl Desk {
     /// A command arbiter; the drive has these settings.
     pub fn new(settings: FirmwareSettings) -> Self {
-        Self { settings: Staging::new(settings), ..Self::default() }
+        Self {
+            settings: Staging::new(settings),
+            unsaved: false,
+            backup_of: None,
+            left_out: 0,
+            saved_on: None,
+            task: None,
+            waits: 0,
+            reboot_ms: None,
+            done: None,
+            designs: 0,
+            announcer: Announcer::default(),
+            stage: StageFaults::default(),
+            shaft: Shaft::default(),
+            braked: false,
+            now_ms: 0,
+            last_activity_ms: None,
+            stopped: None,
+            checking: None,
+            rejected_learning: None,
+            learned: false,
+            homing: Homing::default(),
+            refusal: None,
+            refused: None,
+            modules: ModuleState::default(),
+        }
     }
 
     /// The settings, in force and staged.

@@ -68,12 +68,6 @@ pub fn guarded() -> impl Iterator<Item = Key> {
     keys::all().filter(|key| key.guards())
 }
 
-impl Default for Staging {
-    fn default() -> Self {
-        Self::new(FirmwareSettings::of_the_board())
-    }
-}
-
 impl Staging {
     /// Staging with these settings in force and none staged.
     pub fn new(in_force: FirmwareSettings) -> Self {
