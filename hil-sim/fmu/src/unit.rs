@@ -16,7 +16,7 @@ const SLACK: f64 = 1e-3;
 /// An FMU in use, see the head of the module.
 #[derive(Clone)]
 pub struct Unit {
-    /// Which FMU it is.
+    /// The description of the FMU: that of the drive or that of the motor.
     pub kind: &'static Kind,
     /// Name of a motor of the simulator, or path of a motor file; empty: the dissertation's.
     pub motor: String,

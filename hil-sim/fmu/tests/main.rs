@@ -106,7 +106,7 @@ impl Drop for Fmu {
 struct Pair {
     drive: Fmu,
     motor: Fmu,
-    /// Value references of what the motor and the drive send, and receive.
+    /// Value references of the outputs of motor and drive, and of the inputs that these outputs go to.
     sent: ([u32; 5], [u32; 6]),
     received: ([u32; 5], [u32; 6]),
     in_turn: bool,
