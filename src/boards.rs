@@ -174,7 +174,7 @@ pub struct Shunts {
     pub settle_s: Stated<f32>,
 }
 
-/// The connections of the chip that do not belong to the power stage. [`morpho::NUCLEO`] are those of a NUCLEO-G474RE.
+/// The connections of the chip that do not belong to the power stage. The default values are those of a NUCLEO-G474RE.
 #[derive(Clone, Copy, Debug)]
 pub struct Wiring {
     /// The crystal, Hz.
