@@ -197,7 +197,7 @@ impl fmt::Write for OutputLine {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         let fits = text.floor_char_boundary(OUTPUT - self.text.len());
         let fits = text.get(..fits).unwrap_or_default();
-        self.text.push_str(fits).map_err(|()| fmt::Error)
+        self.text.push_str(fits).map_err(|_| fmt::Error)
     }
 }
 

@@ -29,8 +29,8 @@ const FIFO: u32 = 8;
 
 /// The main loop's end of the port.
 pub struct Lpuart {
-    received: Consumer<'static, u8, RECEIVE>,
-    to_send: Producer<'static, u8, TRANSMIT>,
+    received: Consumer<'static, u8>,
+    to_send: Producer<'static, u8>,
     /// Clock of the port, Hz.
     clock_hz: u32,
 }
@@ -38,8 +38,8 @@ pub struct Lpuart {
 /// The interrupt's end of the port.
 struct PortInterrupt {
     port: pac::LPUART1,
-    received: Producer<'static, u8, RECEIVE>,
-    to_send: Consumer<'static, u8, TRANSMIT>,
+    received: Producer<'static, u8>,
+    to_send: Consumer<'static, u8>,
     /// The BRR register in force.
     divider: u32,
 }

@@ -1,7 +1,7 @@
 //! A place for one message between the control interrupt and the main loop.
 //!
 //! Own code replaces a queue of `heapless`, because the control interrupt writes its report into the message in place. The queues of
-//! `heapless` (0.8 and 0.9.3, also `heapless::mpmc`) take items by value, which costs one more copy for every report.
+//! `heapless` (0.9.4, also `heapless::mpmc`) take items by value, which costs one more copy for every report.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicU32, Ordering};
