@@ -395,19 +395,24 @@ struct CarryOver {
 impl<L: AngleLoop> Drive<L> {
     /// Position of the coefficients in a drive, bytes, for a check of its memory from outside. They
     /// change only when the count at [`Self::CHANGES`] changes.
+    #[doc(hidden)]
     pub const COEFFICIENTS: Range<usize> =
         offset_of!(Self, c)..offset_of!(Self, c) + size_of::<Coefficients<L>>();
     /// Position in a drive of the count of these changes, a `u32`.
+    #[doc(hidden)]
     pub const CHANGES: usize = offset_of!(Self, changes);
 
     /// Position of the word of the phase in a drive, bytes, for a check from outside before each step.
+    #[doc(hidden)]
     pub const PHASE: usize = offset_of!(Self, phase);
     /// Values that the word at [`PHASE`](Self::PHASE) can have: rows of a Hadamard matrix that the core can compare in one
     /// instruction.
+    #[doc(hidden)]
     pub const PHASES: [u32; 6] =
         [0x5555_5555, 0x3333_3333, 0x6666_6666, 0x0f0f_0f0f, 0x00ff_00ff, 0xff00_ff00];
 
     /// Whether a drive whose phase has this word [is off](Self::is_off).
+    #[doc(hidden)]
     pub const fn is_off_in(phase: u32) -> bool {
         phase == Self::PHASES[0] || phase == Self::PHASES[1]
     }
@@ -477,6 +482,7 @@ impl<L: AngleLoop> Drive<L> {
     }
 
     /// Runs one PWM period, see [`Drive::period`].
+    #[doc(hidden)]
     pub fn run_period(
         &mut self,
         front_end: &mut FrontEndState,
@@ -494,6 +500,7 @@ impl<L: AngleLoop> Drive<L> {
     }
 
     /// Runs one step, see [`Drive::step`], and passes the compare values to `put_out` early, if the phase computes them early.
+    #[doc(hidden)]
     pub fn run_step(&mut self, measured: &Measured, put_out: &mut dyn FnMut(Compare)) -> Output {
         let checked = self.c.protect(measured);
         let result = match &mut self.phase {

@@ -17,7 +17,7 @@
 //! |---|---|
 //! | the root | [`Drive`], its [`Coefficients`], states and commands; front end, faults, motor, scales; speed loop, dc link, relay |
 //! | [`io`] | input and output of a step and of the front end |
-//! | [`math`], [`filter`] | vectors and frames; second-order sections |
+//! | [`filter`] | second-order sections |
 //! | [`current`] | PI, modulation, dead time and inverter voltage error |
 //! | [`blocks`] | the optional blocks, each a cargo feature |
 //! | [`carrier`] | the injected voltage and the synchronous demodulation of its current |
@@ -26,6 +26,8 @@
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
 //! | [`learned`], [`table`] | the result of a saliency self-commissioning with locked shaft, and its tables |
 //! | [`homing`] | finding a stop of the shaft |
+//!
+//! Modules of blocks are hidden from this documentation, because only the design of their coefficients uses them.
 //!
 //! The coefficients come from outside: the crate `induction-drive-settings` designs them from settings in SI units.
 //! `induction-drive-commission` finds the parameters of the motor, `induction-drive-rotor-id` its rotor time constant while it
@@ -44,46 +46,64 @@
 //! * Sample `k` acts in period `k + 1`: see [`io`].
 #![cfg_attr(not(test), no_std)]
 
+// Hidden from the documentation, and no part of what a release has to keep, are the blocks, their coefficients and homing: the design in
+// the sibling crates, the firmware and the laboratory of this project use them. A program that runs a drive needs none of them.
+#[doc(hidden)]
 pub mod blocks;
+#[doc(hidden)]
 pub mod carrier;
+#[doc(hidden)]
 pub mod current;
 mod dc_link;
 mod drive;
 mod fault;
+#[doc(hidden)]
 pub mod filter;
+#[doc(hidden)]
 pub mod flux;
 mod front_end;
+#[doc(hidden)]
 pub mod homing;
 mod identify;
 pub mod io;
 pub mod learned;
 mod line;
-pub mod math;
+mod math;
 mod motion;
 mod motor;
+#[doc(hidden)]
 pub mod printed;
+#[doc(hidden)]
 pub mod protect;
 mod supply;
+#[doc(hidden)]
 pub mod table;
 
-pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings, Limiting};
+pub use dc_link::Limiting;
 pub use drive::{
-    Accepted, COAST_S, Coefficients, Command, DefaultLoop, Drive, Mode, Protection, Refused,
-    Regulator, SequenceSteps, Stage, State, Stop, Telemetry, TestReport, TestSignal, TorqueLimits,
+    Accepted, COAST_S, Coefficients, Command, Drive, Mode, Refused, Stage, State, Stop, Telemetry,
+    TestReport, TestSignal, TorqueLimits,
 };
-pub use drive::{DcLimit, PowerLimit};
-pub use fault::Fault;
-pub use flux::{AngleLoop, AngleSource};
-pub use front_end::shunts::Shunts;
-pub use front_end::{FrontEnd, FrontEndState};
-pub use identify::learning::Learning;
+#[doc(inline)]
+pub use flux::AngleSource;
+pub use front_end::FrontEndState;
 pub use io::{CONVERTER_CODES, Compare, Hardware, Measured, Output, PERIOD_S, Sample, periods};
-pub use line::Line;
 pub use math::angle::{Angle, UnitVector};
-pub use math::frames::{Abc, AlphaBeta, Dq, SQRT_3};
+pub use math::frames::{Abc, AlphaBeta, Dq};
+pub use {fault::Fault, line::Line, motor::Motor};
+
+#[doc(hidden)]
+pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings};
+#[doc(hidden)]
+pub use drive::{DcLimit, PowerLimit, Protection, Regulator, SequenceSteps};
+#[doc(hidden)]
+pub use front_end::{FrontEnd, shunts::Shunts};
+#[doc(hidden)]
+pub use math::{frames::SQRT_3, limited, within};
+#[doc(hidden)]
 pub use motion::{Motion, MotionGains, Ramps};
-pub use motor::{FirstOrder, Motor};
-pub use supply::Relay;
+#[doc(hidden)]
+pub use {flux::AngleLoop, identify::learning::Learning, motor::FirstOrder, supply::Relay};
 
 /// The settings and the design, compiled into the unit tests, because as a dependency they would bring a second instance of this
 /// crate.

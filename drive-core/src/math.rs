@@ -49,7 +49,7 @@ pub(crate) mod angle;
 pub(crate) mod frames;
 
 /// Whether all values are finite numbers.
-pub fn all_finite(values: &[f32]) -> bool {
+pub(crate) fn all_finite(values: &[f32]) -> bool {
     values.iter().all(|value| value.is_finite())
 }
 

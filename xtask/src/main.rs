@@ -24,6 +24,7 @@ mod sections;
 mod size;
 mod sources;
 mod stack;
+mod surface;
 mod toolchain;
 mod tools;
 mod uses;
@@ -88,7 +89,8 @@ enum Task {
     Size,
     /// Counts lines of code, documentation, comments and tests; fails above the budgets
     Lines,
-    /// Fails if modules of a crate refer to each other in a circle, or if too many files name a module of the firmware
+    /// Fails if modules of a crate refer to each other in a circle, if too many files name a module of the firmware, or if the control
+    /// crate has too many public items
     Rooms,
     /// Changes drive-core in many places and runs its tests on each change; fails if under 90 % are caught. Installs cargo-mutants from
     /// crates.io
@@ -163,7 +165,7 @@ fn run(task: Task) -> Result<()> {
         Task::Fuzz { seconds } => fuzz::fuzz(seconds),
         Task::Size => size::report_all(),
         Task::Lines => lines::report(),
-        Task::Rooms => rooms::check().and_then(|()| uses::check()),
+        Task::Rooms => rooms::check().and_then(|()| uses::check()).and_then(|()| surface::check()),
         Task::Mutants { shard } => tools::mutants(&shard),
         Task::Book => tools::book().map(drop),
         Task::Pages => by_name::pages(),
@@ -235,6 +237,7 @@ fn test() -> Result<()> {
     let mut documentation = run::cargo("doc --workspace --no-deps");
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     steps.command("documentation", documentation);
+    steps.run("public interface of the control", surface::check);
 
     let rest = "--test page --test clones --bin xtask --no-fail-fast";
     let rest = run::cargo(&format!("test {} {rest}", run::TESTED));

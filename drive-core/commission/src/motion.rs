@@ -3,8 +3,7 @@
 
 use core::mem::replace;
 
-use drive_core::PERIOD_S;
-use drive_core::math::limited;
+use drive_core::{PERIOD_S, limited};
 
 /// Control periods from one pair of values to the next: 10 ms. The speed is a mean over the same time and smoothed over 5
 /// ms, so it belongs to the integrals of the pair before.

@@ -18,6 +18,7 @@ impl<L: AngleLoop> Drive<L> {
     ///
     /// # Errors
     /// See [`Drive::command`].
+    #[doc(hidden)]
     pub fn execute(&mut self, command: &Command<L>) -> Result<Accepted, Refused> {
         allowed(command, self.state_now(), self.mode())?;
         match *command {

@@ -68,6 +68,7 @@ pub struct TorqueLimits {
 
 impl<L: AngleLoop> Drive<L> {
     /// Position of the [telemetry](Self::telemetry) in a drive, bytes.
+    #[doc(hidden)]
     pub const TELEMETRY: usize = offset_of!(Self, kept.seen);
 
     /// Returns the limits of the present torque.

@@ -64,7 +64,7 @@ impl Angle {
     /// Returns the angle from turns known to lie within ±0.5, by one multiplication and one conversion.
     ///
     /// It saturates beyond that range; NaN gives zero.
-    pub fn within_turn(turns: f32) -> Self {
+    pub(crate) fn within_turn(turns: f32) -> Self {
         Self::from_bits((turns * UNITS_PER_TURN) as i32)
     }
 
@@ -74,7 +74,7 @@ impl Angle {
     }
 
     /// Returns the angle from degrees; see [`Angle::from_turns`].
-    pub fn from_degrees(degrees: f32) -> Self {
+    pub(crate) fn from_degrees(degrees: f32) -> Self {
         Self::from_turns(degrees * (1.0 / 360.0))
     }
 
@@ -128,14 +128,14 @@ impl UnitVector {
     /// The error is below 1e-5 up to 0.02 turns, not more than the error of [`Angle::unit_vector`];
     /// there the error of the length is x^4/72 = 4e-6.
     #[inline]
-    pub fn turned_slightly(self, turns: f32) -> Self {
+    pub(crate) fn turned_slightly(self, turns: f32) -> Self {
         let x = turns * TAU;
         let half = 0.5 * x * x;
         self.turned_by(Self { cos: 1.0 - half, sin: x - x * half * (1.0 / 3.0) })
     }
 
     /// Returns the vector rotated by the angle of `other`.
-    pub fn turned_by(self, other: Self) -> Self {
+    pub(crate) fn turned_by(self, other: Self) -> Self {
         Self {
             cos: self.cos * other.cos - self.sin * other.sin,
             sin: self.sin * other.cos + self.cos * other.sin,

@@ -124,12 +124,13 @@ impl AlphaBeta {
     }
 
     /// Applies the Park transformation, Eq. 2.5 / 2.6, into the frame whose d axis lies along `axis`.
-    pub fn to_dq(self, axis: UnitVector) -> Dq {
+    pub(crate) fn to_dq(self, axis: UnitVector) -> Dq {
         let (d, q) = self.seen_from(axis);
         Dq { d, q }
     }
 
     /// Rotates the vector into the measuring frame whose dm axis is `axis` = `e^(j (theta - 45°))`.
+    #[doc(hidden)]
     pub fn to_dm_qm(self, axis: UnitVector) -> DmQm {
         let (dm, qm) = self.seen_from(axis);
         DmQm { dm, qm }
@@ -146,7 +147,7 @@ impl AlphaBeta {
     }
 
     /// Returns the components along `axis` and across it, 90° ahead.
-    pub fn seen_from(self, axis: UnitVector) -> (f32, f32) {
+    pub(crate) fn seen_from(self, axis: UnitVector) -> (f32, f32) {
         (axis.cos * self.alpha + axis.sin * self.beta, axis.cos * self.beta - axis.sin * self.alpha)
     }
 }
@@ -161,7 +162,7 @@ impl core::ops::Mul<f32> for UnitVector {
 
 impl Dq {
     /// Returns the same vector in a frame that is ahead by `lead`.
-    pub fn seen_from(self, lead: UnitVector) -> Self {
+    pub(crate) fn seen_from(self, lead: UnitVector) -> Self {
         Self { d: self.d * lead.cos + self.q * lead.sin, q: self.q * lead.cos - self.d * lead.sin }
     }
 

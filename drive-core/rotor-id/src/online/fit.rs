@@ -4,7 +4,7 @@
 
 use crate::rls::Rls;
 use crate::rls::ud::N;
-use drive_core::math::limited;
+use drive_core::limited;
 use num_complex::Complex32;
 
 /// Fitted parameters.
