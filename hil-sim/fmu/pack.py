@@ -39,12 +39,20 @@ def model_description(told):
         label, causality, unit, words = one["name"], one["causality"], one.get("unit"), one.get("words")
         is_real = "start" in one and not words
         variability = "fixed" if causality == "parameter" else "continuous" if is_real else "discrete"
+        about = one["about"]
+        # Importers such as libcosim leave enumerations out, so that nobody could connect one.
+        is_number = words and causality != "parameter"
+        if is_number:
+            about += ": " + ", ".join(f"{place} {word}" for place, word in enumerate(words))
         scalar = xml.SubElement(variables, "ScalarVariable", name=label, valueReference=str(one["reference"]),
-                                description=one["about"], causality=causality, variability=variability)
-        value = xml.SubElement(scalar, "Real" if is_real else "Enumeration" if words else "String")
-        start = one.get("start", "")
-        if words:
-            start = int(start)
+                                description=about, causality=causality, variability=variability)
+        kind = "Real" if is_real else "Integer" if is_number else "Enumeration" if words else "String"
+        value = xml.SubElement(scalar, kind)
+        start = int(one["start"]) if words else one.get("start", "")
+        if is_number:
+            value.set("min", "0")
+            value.set("max", str(len(words) - 1))
+        elif words:
             value.set("declaredType", label)
             kind = xml.SubElement(xml.SubElement(types, "SimpleType", name=label), "Enumeration")
             for place, word in enumerate(words):

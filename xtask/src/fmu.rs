@@ -1,4 +1,4 @@
-//! `cargo xtask fmu`: drive and motor as functional mock-up units, and their test under FMPy.
+//! `cargo xtask fmu`: drive and motor as functional mock-up units, and their test under FMPy and libcosim.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX, EXE_SUFFIX};
 use std::fs;
@@ -23,7 +23,7 @@ pub fn build() -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Packs both and tests them in a clean environment.
+/// Packs both and tests them in a clean environment under both importers.
 pub fn test() -> Result<()> {
     let folder = build()?;
     let mut test = python::environment("fmu", &["-r", "hil-sim/fmu/tests/requirements.txt"])?;

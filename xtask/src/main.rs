@@ -108,7 +108,7 @@ enum Task {
     Web,
     /// Builds the wheel for Python into target/wheels and tests it in a clean environment. Installs maturin, numpy and more from PyPI
     Python,
-    /// Packs drive and motor as FMUs into target/fmu and tests them. Installs FMPy from PyPI
+    /// Packs drive and motor as FMUs into target/fmu and tests them. Installs FMPy and libcosimpy from PyPI
     Fmu,
     /// Makes the folder of a release: images, programs, drive in a browser, book, lists of crates, licences, check sums
     Dist(dist::Dist),
