@@ -48,6 +48,8 @@ pub const PWM_TOP: u16 = {
     assert!(top <= u16::MAX as u32);
     top as u16
 };
+/// A control period with one pulse, in ticks.
+pub const PERIOD_TICKS: u32 = 2 * PWM_TOP as u32;
 // The control rate differs from the nominal one by less than 1e-4, due to rounding: by 2.4e-5 with one pulse, by 4.7e-5 the
 // other way with two and three.
 const _: () = {
@@ -134,12 +136,10 @@ pub const TIM1_BDTR_MOE: u32 = 1 << 15;
 
 // ADCs =>----------------------------------------------------------------------------------
 
-/// Clock of the ADCs, Hz: a quarter of the core clock and synchronous to it, so the sampling instant does not jitter.
-pub const ADC_HZ: u32 = CLOCK_HZ / ADC_CLOCK_DIVIDER;
-/// Core clocks per ADC clock.
+/// Core clocks per clock of the ADCs, which is synchronous to the core clock, so the sampling instant does not jitter.
 pub const ADC_CLOCK_DIVIDER: u32 = 4;
 // Two ADCs at a time: 52 MHz (datasheet, single-ended, all ADCs in operation).
-const _: () = assert!(ADC_HZ <= 52_000_000);
+const _: () = assert!(CLOCK_HZ / ADC_CLOCK_DIVIDER <= 52_000_000);
 
 /// A sampling time of the ADC.
 #[derive(Clone, Copy)]
@@ -166,12 +166,13 @@ pub const SLOW_SAMPLING: SamplingTime = SamplingTime { code: 4, half_clocks: 95 
 pub const REFERENCE_SAMPLING: SamplingTime = SamplingTime { code: 6, half_clocks: 495 };
 const _: () = assert!(REFERENCE_SAMPLING.ticks() >= 4 * CYCLES_PER_US);
 /// A 12-bit conversion after the sampling: 12.5 clocks.
-const CONVERSION: SamplingTime = SamplingTime { code: 0, half_clocks: 25 };
+pub const CONVERSION: SamplingTime = SamplingTime { code: 0, half_clocks: 25 };
 
 /// Compare value of the trigger, with one pulse per control period. The sampling of the currents starts while the counter goes up. It
 /// ends, which fixes the sampled value, when the counter is at the top and all low sides are on.
 pub const SAMPLE_AT: u16 = PWM_TOP - CURRENT_SAMPLING.ticks() as u16;
-/// Compare value of the trigger in the upper zero vector, on the way down: this sampling ends when the counter is at 0.
+/// Compare value of the trigger in the upper zero vector, on the way down: this sampling ends when the counter is at 0. On the way up it
+/// starts the slow inputs of the terminals.
 pub const UPPER_SAMPLE_AT: u32 = CURRENT_SAMPLING.ticks();
 /// Time from the end of the sampling to the control interrupt, in ticks. A third current is converted after the first two.
 pub const SAMPLES_READY_TICKS: u32 = 2 * CONVERSION.ticks()
@@ -208,8 +209,8 @@ fn window(line: Line, trip_a: f32) -> (u16, u16) {
 
 // Cross-checks --------------------------------------------------------------------------------
 
-/// Periods of the watchdog's oscillator that one capture spans, by the prescaler of the capture.
-const LSI_PERIODS: u32 = 8;
+/// Periods of an oscillator that one capture spans, by the prescaler of the capture.
+const CAPTURED: u32 = 8;
 /// Lowest and highest frequency of the watchdog's oscillator, Hz, measured with a correct core clock. If the internal oscillator replaces
 /// the crystal, its error widens the range by [`INTERNAL_HZ`] on either side: 2 % (datasheet, over all temperatures).
 const LSI_HZ: (u32, u32) = (29_000, 35_000);
@@ -217,13 +218,19 @@ const INTERNAL_HZ: u32 = 700;
 const _: () = assert!(LSI_HZ.0 < WATCHDOG_HZ && LSI_HZ.1 > WATCHDOG_HZ_MAX);
 /// Longest wait from one capture to the next, us.
 pub const LSI_TIMEOUT_US: u32 = 600;
-const _: () = assert!(LSI_TIMEOUT_US > 2 * LSI_PERIODS * 1_000_000 / (LSI_HZ.0 - INTERNAL_HZ));
+const _: () = assert!(LSI_TIMEOUT_US > 2 * CAPTURED * 1_000_000 / (LSI_HZ.0 - INTERNAL_HZ));
 
-/// Whether the core clock and the watchdog's oscillator agree, from the core `clocks` between two captures.
-pub fn clocks_agree(clocks: u32, internal: bool) -> bool {
+/// Core clocks between two captures of the HSI divided by 16.
+const HSI_CLOCKS: u32 = 16 * CAPTURED * (CLOCK_HZ / 1000) / (HSI_HZ / 1000);
+/// Longest wait for two captures of the HSI, us: each takes 8 us.
+pub const HSI_TIMEOUT_US: u32 = 40;
+
+/// Whether the core clock agrees with LSI and HSI, from the core clocks between two captures of each. From the HSI it may differ by 2.5 %.
+/// The HSI is off by 2 % at most (datasheet, over all temperatures), so an error of the core clock of 4.5 % is always found.
+pub fn clocks_agree((lsi, hsi): (u32, u32), internal: bool) -> bool {
     let more = if internal { INTERNAL_HZ } else { 0 };
-    let hz = LSI_PERIODS * CLOCK_HZ / clocks.max(1);
-    (LSI_HZ.0 - more..=LSI_HZ.1 + more).contains(&hz)
+    let hz = CAPTURED * CLOCK_HZ / lsi.max(1);
+    (LSI_HZ.0 - more..=LSI_HZ.1 + more).contains(&hz) && HSI_CLOCKS.abs_diff(hsi) <= HSI_CLOCKS / 40
 }
 
 /// Address of the ADC counts that the chip's own reference gave in the factory (datasheet, VREFINT_CAL), and the ADC reference voltage
@@ -244,15 +251,6 @@ pub fn references_agree(code: u16, calibration: u16) -> bool {
 /// Reaction time of the fault input of the power stage, from its edge to the outputs off, ns: the filter and a few clocks of the timer,
 /// no software.
 pub const BREAK_REACTION_NS: u32 = BREAK_FILTER_NS + 4 * 1000 / CYCLES_PER_US;
-/// Reaction time of an analog watchdog, from an over-current to the outputs off, ns: up to a period until the next sample, the
-/// conversion, and the latest start of the interrupt that is allowed.
-pub const WATCHDOG_REACTION_NS: u32 =
-    (2 * PWM_TOP as u32 + CONVERSION.ticks()) * 1000 / CYCLES_PER_US + LATEST_START_US * 1000;
-/// Reaction time of the software, from an over-current to the outputs off, ns: up to a period until the next sample, the whole sequence,
-/// the latest allowed start of the interrupt, and the control step.
-pub const SOFTWARE_REACTION_NS: u32 = (2 * PWM_TOP as u32 + SAMPLES_READY_TICKS) * 1000
-    / CYCLES_PER_US
-    + (LATEST_START_US + LONGEST_STEP_US) * 1000;
 /// Latest allowed start of the control interrupt after its samples are ready, us. Nothing masks the running
 /// interrupt, not even the log: only its entry and the interrupted instruction remain, below 1 us. `status`
 /// shows the latest start so far.
@@ -260,14 +258,7 @@ pub const LATEST_START_US: u32 = 10;
 /// Longest control interrupt that the window watchdog allows, cycles: one that takes a start command. The next interrupt may be late by
 /// this time, and the one after it early. `cargo xtask cycles` fails above it.
 pub const LONGEST_INTERRUPT_CYCLES: u32 = 12_000;
-/// Longest control step assumed here, us; `status` shows the longest so far, in cycles.
-const LONGEST_STEP_US: u32 = 20;
-const _: () = {
-    assert!(BREAK_REACTION_NS < 200);
-    // Both reactions by software end before the next period does.
-    assert!(WATCHDOG_REACTION_NS < SOFTWARE_REACTION_NS);
-    assert!(SOFTWARE_REACTION_NS < 200_000);
-};
+const _: () = assert!(BREAK_REACTION_NS < 200);
 
 // Over-voltage ----------------------------------------------------------------------------------
 
@@ -331,24 +322,8 @@ pub const COMPARABLE: u16 = 410;
 /// 10 000 counts a turn at 1440 rpm come every 4.2 us.
 pub const ENCODER_FILTER: u8 = 0b1000;
 
-// Console -------------------------------------------------------------------------------------
+// Recording -----------------------------------------------------------------------------------
 
-/// Bits per second after a reset; 8 data bits, no parity, 1 stop bit.
-pub const SERIAL_BAUD: u32 = 115_200;
-/// Highest rate that `baud` takes, bits per second: a byte is 850 core cycles, so that the FIFO of eight bytes outlasts the
-/// longest control interrupt.
-pub const SERIAL_BAUD_MAX: u32 = 2_000_000;
-/// Ticks of LPUART1's clock, Hz, per bit, in 1/256 (RM0440, LPUART_BRR), rounded.
-pub const fn serial_divider(clock_hz: u32, baud: u32) -> u32 {
-    ((256 * clock_hz as u64 + baud as u64 / 2) / baud as u64) as u32
-}
-// Range of the register.
-const _: () = {
-    assert!(serial_divider(CLOCK_HZ, SERIAL_BAUD) <= 0xf_ffff);
-    assert!(serial_divider(HSI_HZ, SERIAL_BAUD_MAX) >= 0x300);
-};
-/// Time without a valid line after which the port goes back to [`SERIAL_BAUD`], ms.
-pub const SERIAL_FALL_BACK_MS: u32 = 1000;
 /// Records of the longest trace, 32 bytes each.
 pub const TRACE_RECORDS: usize = 1024;
 /// Size of the ring of control periods for stream, identification and commissioning in the main loop. It holds one less: 5.2 ms if every
@@ -401,6 +376,26 @@ const _: () = assert!(
 );
 
 // Option bytes --------------------------------------------------------------------------------
+
+/// Bits of FLASH_OPTR (RM0440) and the values that the firmware needs, each with its error. With the other value of WWDG_SW or BFB2 the
+/// chip hardly gets as far: the start block is longer than the watchdog's time, and it resets what ST's loader has started. BOR level and
+/// read-out protection may have any value: no run depends on them.
+const OPTIONS: [(u32, bool, &str); 5] = [
+    (22, true, "option bytes: the flash has one bank; set DBANK to 1"),
+    (16, true, "option bytes: the watchdog runs before the control does; set IWDG_SW to 1"),
+    (19, true, "option bytes: the window watchdog runs before the control does; set WWDG_SW to 1"),
+    (20, false, "option bytes: ST's loader chooses the bank; set BFB2 to 0"),
+    (24, true, "option bytes: the parity of the RAM counts, which is not set up; set SRAM_PE to 1"),
+];
+
+/// Checks the option bytes.
+///
+/// # Errors
+/// The first option that is wrong, by its name and the value that it needs.
+pub fn check_options(option_bytes: u32) -> Result<(), &'static str> {
+    let wrong = |&&(bit, set, _): &&(u32, bool, _)| (option_bytes >> bit & 1 != 0) != set;
+    OPTIONS.iter().find(wrong).map_or(Ok(()), |(_, _, why)| Err(*why))
+}
 
 /// Bit of FLASH_OPTR (RM0440): the level of PB8 counts at a reset; without this bit, the next one starts the firmware.
 const N_SWBOOT0: u32 = 1 << 26;

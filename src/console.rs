@@ -8,6 +8,7 @@
 
 mod announce;
 mod answer;
+pub mod baud;
 mod board;
 pub mod grammar;
 pub mod handle;

@@ -80,6 +80,8 @@ pub struct History {
     running_ms: u32,
     /// Number of starts.
     pub starts: u32,
+    /// Errors that the flash has corrected since the last reset.
+    pub corrected: u32,
     faults: Deque<PastFault, FAULTS>,
     page: usize,
     sequence: u32,

@@ -36,7 +36,7 @@ pub use settings::{ROWS, Settings};
 
 /// The pins of the terminals. Without a pin a contact counts as open.
 pub trait Port {
-    /// The contacts that are closed now. Called once a millisecond; each call converts another analog input.
+    /// The contacts that are closed now. Called once a millisecond.
     fn look(&mut self) -> Contacts;
     /// The last ADC counts of reference, second reference, and the sensor in the motor's winding; `None` if the board has no such input,
     /// or its ADC gives no result.

@@ -220,9 +220,9 @@ mod image {
         let mut adc = adc::Adc::new(chip.ADC1, chip.ADC2, &chip.ADC12_COMMON, &mut rcc, levels)?;
         adc.convert_both(designed.coefficients.front_end.both_zero_vectors);
         pwm.start()?;
-        let clocks = time::lsi_clocks();
+        let clocks = time::captured();
         if !clocks.is_some_and(|n| board::clocks_agree(n, source == clocks::Source::Internal)) {
-            return Err("the core clock and the watchdog's oscillator disagree");
+            return Err("the core clock and the oscillators of the chip disagree");
         }
         let mailbox = singleton!(: Mailbox<Option<Report>> = Mailbox::new(None)).ok_or(TWICE)?;
         let (report, reports) = mailbox.split();

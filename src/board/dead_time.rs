@@ -4,17 +4,13 @@
 pub const LONGEST: u32 = ticks(u8::MAX);
 
 /// The shortest dead time of the DTG field that is not below `ticks`, which is at most [`LONGEST`].
-pub const fn code(ticks: u32) -> u8 {
-    if ticks <= 127 {
-        ticks as u8
-    } else if ticks <= 2 * 127 {
-        0b1000_0000 | (ticks.div_ceil(2) - 64) as u8
-    } else if ticks <= 8 * 63 {
-        0b1100_0000 | (ticks.div_ceil(8) - 32) as u8
-    } else {
-        assert!(ticks <= LONGEST, "longer than the timer can make it");
-        0b1110_0000 | (ticks.div_ceil(16) - 32) as u8
+pub const fn code(wanted: u32) -> u8 {
+    assert!(wanted <= LONGEST, "longer than the timer can make it");
+    let mut code = 0;
+    while ticks(code) < wanted {
+        code += 1;
     }
+    code
 }
 
 /// The dead time of a DTG field, ticks.

@@ -42,6 +42,20 @@ fn the_protection_follows_the_settings_and_stays_in_the_range_of_the_converters(
     assert_eq!((ends.window_a, ends.over_voltage), ((1, ADC_FULL_SCALE - 1), 3971));
 }
 
+/// Reaction time of an analog watchdog, from an over-current to the outputs off, ns: up to a period until the next sample, the
+/// conversion, and the latest start of the interrupt that is allowed.
+const WATCHDOG_REACTION_NS: u32 =
+    (2 * PWM_TOP as u32 + CONVERSION.ticks()) * 1000 / CYCLES_PER_US + LATEST_START_US * 1000;
+/// Reaction time of the software, from an over-current to the outputs off, ns: up to a period until the next sample, the whole sequence,
+/// the latest allowed start of the interrupt, and the control step.
+const SOFTWARE_REACTION_NS: u32 = (2 * PWM_TOP as u32 + SAMPLES_READY_TICKS) * 1000 / CYCLES_PER_US
+    + (LATEST_START_US + LONGEST_STEP_US) * 1000;
+/// Longest control step assumed here, us; `status` shows the longest so far, in cycles.
+const LONGEST_STEP_US: u32 = 20;
+// Both reactions by software end before the next period does.
+const _: () =
+    assert!(WATCHDOG_REACTION_NS < SOFTWARE_REACTION_NS && SOFTWARE_REACTION_NS < 200_000);
+
 #[test]
 fn reaction_times_are_those_of_the_documentation() {
     let times = [
@@ -111,7 +125,8 @@ fn the_drive_accepts_the_board() {
 /// Beyond 29 and 35 kHz it fails.
 #[test]
 fn clocks_agree_over_the_range_of_the_oscillator() {
-    let clocks = |hz: f64, error: f64| (8.0 * f64::from(CLOCK_HZ) * (1.0 + error) / hz) as u32;
+    let clocks =
+        |hz: f64, error: f64| ((8.0 * f64::from(CLOCK_HZ) * (1.0 + error) / hz) as u32, HSI_CLOCKS);
     for hz in [29.5e3, 32e3, 34e3] {
         assert!(clocks_agree(clocks(hz, 0.0), false), "{hz}");
         assert!([-0.02, 0.02].iter().all(|error| clocks_agree(clocks(hz, *error), true)), "{hz}");
@@ -119,7 +134,24 @@ fn clocks_agree_over_the_range_of_the_oscillator() {
     for hz in [0.5, 16e3, 28.2e3, 35.8e3, 64e3] {
         assert!(!clocks_agree(clocks(hz, 0.0), false) && !clocks_agree(clocks(hz, 0.0), true));
     }
-    assert!(!clocks_agree(0, true));
+    assert!(!clocks_agree((0, HSI_CLOCKS), true) && !clocks_agree((clocks(32e3, 0.0).0, 0), true));
+    // The HSI at the ends of its range passes, a crystal that is 4 % off beside a right one does not.
+    for (error, right) in [(0.02, true), (-0.02, true), (0.04, false), (-0.04, false)] {
+        let hsi = (f64::from(HSI_CLOCKS) * (1.0 + error)) as u32;
+        assert_eq!(clocks_agree((clocks(32e3, error).0, hsi), false), right, "{error}");
+    }
+}
+
+/// The factory's option bytes pass, and each bit that the firmware needs is named.
+#[test]
+fn wrong_option_bytes_are_named() {
+    let factory = 0xffef_f8aa;
+    assert_eq!(check_options(factory), Ok(()));
+    let names = ["IWDG_SW", "WWDG_SW", "BFB2", "DBANK", "SRAM_PE"];
+    for (name, bit) in names.into_iter().zip([16, 19, 20, 22, 24]) {
+        let why = check_options(factory ^ 1 << bit).unwrap_err();
+        assert!(why.contains(&format!("set {name} to {}", factory >> bit & 1)), "{why}");
+    }
 }
 
 /// The factory has measured the chip's own reference with 3.0 V.

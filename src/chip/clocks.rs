@@ -12,13 +12,13 @@ use super::StartError;
 use crate::board;
 use crate::boards::SELECTED;
 
-/// Source of the core's clock.
+/// Source of the core's clock, with its code in PLLSRC.
 #[derive(Clone, Copy, PartialEq, Eq, defmt::Format)]
 pub enum Source {
     /// The crystal.
-    Crystal,
+    Crystal = 3,
     /// The internal oscillator: 1 % accurate, and so are the control rate and all speeds.
-    Internal,
+    Internal = 2,
 }
 
 // Both oscillators are divided to 4 MHz, multiplied to 340 MHz and halved: inside what the PLL
@@ -79,7 +79,7 @@ pub fn start(
     let pll =
         PllConfig { mux, m: divider, n: MULTIPLIER, r: Some(OUTPUT_DIVIDER), q: None, p: None };
     // The HAL waits for the PLL without a limit, and no watchdog runs yet.
-    if !pll_locks(&rcc, source == Source::Crystal) {
+    if !pll_locks(&rcc, source, divider) {
         return (rcc, source, Err("the PLL does not lock"));
     }
     // Above 150 MHz the core needs its boosted voltage range.
@@ -115,9 +115,8 @@ fn read_back(flash: &pac::FLASH) -> Result<(), StartError> {
 }
 
 /// Whether the PLL locks on its source, within a limit; leaves it off.
-fn pll_locks(rcc: &Rcc, crystal: bool) -> bool {
-    let (source, divider) = if crystal { (3, CRYSTAL_DIVIDER) } else { (2, INTERNAL_DIVIDER) };
-    let setting = MULTIPLIER.multiplier() << 8 | (divider.divisor() - 1) << 4 | source;
+fn pll_locks(rcc: &Rcc, source: Source, divider: PllMDiv) -> bool {
+    let setting = MULTIPLIER.multiplier() << 8 | (divider.divisor() - 1) << 4 | source as u32;
     // SAFETY: PLLN, PLLM and PLLSRC as RM0440 codes them; no output is on.
     rcc.pllcfgr().write(|w| unsafe { w.bits(setting) });
     rcc.cr().modify(|_, w| w.pllon().on());

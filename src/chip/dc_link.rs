@@ -10,14 +10,12 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use super::clocks::clock_on;
 use super::{StartError, pins};
-use crate::board;
+use crate::board::PERIOD_TICKS;
 use crate::boards::pin::Pin;
 use crate::boards::{Level, SELECTED, pin};
 
 const CHOPPER: Pin = SELECTED.wiring.chopper;
 const RELAY: Pin = SELECTED.wiring.relay;
-/// Ticks of a control period with one pulse.
-const PERIOD: u16 = 2 * board::PWM_TOP;
 
 /// Chopper and relay.
 pub struct DcLink {
@@ -33,7 +31,7 @@ impl DcLink {
         clock_on!(rcc.apb2enr(), tim8en, "TIM8")?;
         // Halted by a debugger, the counter stops and the chopper goes off.
         debug.apb2_fz().modify(|_, w| w.dbg_tim8_stop().set_bit());
-        timer.arr().write(|w| w.arr().set(u32::from(PERIOD - 1)));
+        timer.arr().write(|w| w.arr().set(PERIOD_TICKS - 1));
         // High below the compare value (PWM mode 1), which is preloaded.
         timer.ccmr1_output().write(|w| w.oc1m().pwm_mode1().oc1pe().enabled());
         timer.ccr1().write(|w| w.ccr().set(0));
@@ -63,7 +61,7 @@ impl DcLink {
     /// Sets the duty of the chopper, 0 to 1, from the next period on, and the relay.
     pub fn set(&mut self, duty: f32, relay: bool) {
         // The cast saturates.
-        self.timer.ccr1().write(|w| w.ccr().set((duty * f32::from(PERIOD)) as u32));
+        self.timer.ccr1().write(|w| w.ccr().set((duty * PERIOD_TICKS as f32) as u32));
         pins::set(RELAY, if relay { Level::High } else { Level::Low });
     }
 }

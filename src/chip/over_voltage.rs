@@ -112,21 +112,19 @@ pub fn watch(
     }
 }
 
-/// Whether the comparator has tripped. If it has not, this tests it: it has to trip at half of the dc link (ADC counts) and not at its
-/// own level afterwards. For a drive that is off.
+/// Whether the comparator works. With a dc link (ADC counts) this tests it: it has to trip at half of the dc link, and not at its own level
+/// afterwards. Without one the last test counts. For a drive that is off, before each start.
 pub fn prove(dc_link: u16) -> bool {
-    if dc_link < board::COMPARABLE || PROVED.load(Ordering::Relaxed) {
-        return PROVED.load(Ordering::Relaxed);
+    if dc_link >= board::COMPARABLE {
+        // SAFETY: both always exist. After `watch` only this function writes the level; it only reads the comparator.
+        let (dac, comparators) = unsafe { (&*pac::DAC3::ptr(), &*pac::COMP::ptr()) };
+        let level = dac.dhr12r1().read().daccdhr().bits();
+        let trips_at = |code: u16| {
+            dac.dhr12r1().write(|w| w.daccdhr().set(code));
+            asm::delay(board::DAC_START_US * board::CYCLES_PER_US);
+            csr(comparators).read().value().bit()
+        };
+        PROVED.store(trips_at(dc_link / 2) & !trips_at(level), Ordering::Relaxed);
     }
-    // SAFETY: both always exist. After `watch` only this function writes the level; it only reads the comparator.
-    let (dac, comparators) = unsafe { (&*pac::DAC3::ptr(), &*pac::COMP::ptr()) };
-    let level = dac.dhr12r1().read().daccdhr().bits();
-    let trips_at = |code: u16| {
-        dac.dhr12r1().write(|w| w.daccdhr().set(code));
-        asm::delay(board::DAC_START_US * board::CYCLES_PER_US);
-        csr(comparators).read().value().bit()
-    };
-    let proved = trips_at(dc_link / 2) & !trips_at(level);
-    PROVED.store(proved, Ordering::Relaxed);
-    proved
+    PROVED.load(Ordering::Relaxed)
 }

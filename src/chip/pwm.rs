@@ -106,6 +106,9 @@ impl Pwm {
         // have torn, have been read before.
         clock_on!(rcc.apb2enr(), syscfgen, "SYSCFG")?;
         system.cfgr2().modify(|_, w| w.cll().set_bit().pvdl().set_bit().eccl().set_bit());
+        // The control code has been copied: nothing writes the CCM any more.
+        // SAFETY: each bit write-protects a page of it.
+        system.swpr().write(|w| unsafe { w.bits(u32::MAX) });
 
         // The break inputs: the fault output of the power stage, and the comparator of the dc link, which trips high. One OR gate
         // combines them, so each must be low after its own polarity in normal operation, and the break itself is active high (BKP below).

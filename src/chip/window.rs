@@ -6,22 +6,20 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use super::StartError;
 use super::clocks::clock_on;
-use crate::board::{self, LONGEST_INTERRUPT_CYCLES};
+use crate::board::{LONGEST_INTERRUPT_CYCLES, PERIOD_TICKS};
 
 /// Core cycles per count.
 const CLOCK: u32 = 4096;
-/// Cycles of a control period.
-const PERIOD: u32 = 2 * board::PWM_TOP as u32;
 /// The last value before a reset.
 const LAST: u32 = 0x40;
 /// Counts from one feeding to the reset; the first count may be cut short.
-const COUNTS: u32 = 3 * PERIOD / CLOCK;
+const COUNTS: u32 = 3 * PERIOD_TICKS / CLOCK;
 /// Counts after a feeding within which the next feeding is too early.
-const CLOSED: u32 = (PERIOD - LONGEST_INTERRUPT_CYCLES) / CLOCK;
+const CLOSED: u32 = (PERIOD_TICKS - LONGEST_INTERRUPT_CYCLES) / CLOCK;
 const RELOAD: u8 = (LAST + COUNTS - 1) as u8;
 // The counts fit seven bits, and a period that is late by the longest interrupt causes no reset.
 const _: () = assert!(
-    RELOAD < 0x80 && (COUNTS - 1) * CLOCK > PERIOD + LONGEST_INTERRUPT_CYCLES && CLOSED > 0
+    RELOAD < 0x80 && (COUNTS - 1) * CLOCK > PERIOD_TICKS + LONGEST_INTERRUPT_CYCLES && CLOSED > 0
 );
 
 /// The watchdog.

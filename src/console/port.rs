@@ -12,8 +12,7 @@ use stm32g4xx_hal::pac::{self, Interrupt};
 use stm32g4xx_hal::rcc::Rcc;
 use stm32g4xx_hal::stm32::interrupt;
 
-use super::handle;
-use crate::board;
+use super::{baud, handle};
 use crate::boards::{Level, SELECTED, pin};
 use crate::chip::{LOWEST_PRIORITY, pins};
 
@@ -75,7 +74,7 @@ impl Lpuart {
 
         // The interrupt is raised by damaged bytes, too.
         port.cr3().write(|w| w.eie().enabled());
-        let divider = board::serial_divider(clock_hz, board::SERIAL_BAUD);
+        let divider = baud::divider(clock_hz, baud::USUAL);
         DIVIDER.store(divider, Ordering::Relaxed);
         IN_FORCE.store(divider, Ordering::Relaxed);
         let end = PortInterrupt { port, received: write_received, to_send: read_to_send, divider };
@@ -113,8 +112,8 @@ impl handle::Port for Lpuart {
         true
     }
 
-    fn change_rate(&mut self, baud: u32) -> bool {
-        let divider = board::serial_divider(self.clock_hz, baud);
+    fn change_rate(&mut self, rate: u32) -> bool {
+        let divider = baud::divider(self.clock_hz, rate);
         DIVIDER.store(divider, Ordering::Relaxed);
         NVIC::pend(Interrupt::LPUART);
         IN_FORCE.load(Ordering::Relaxed) == divider

@@ -1,8 +1,7 @@
 //! The requests of a stream, the silence that ends it, and the bits per second of the port.
 
-use super::Console;
 use super::handle::{Firmware, Port};
-use crate::board;
+use super::{Console, baud};
 use crate::desk::Desk;
 use crate::recording::stream::{Frames, Stream};
 use crate::settings::Commander;
@@ -17,8 +16,7 @@ pub(super) struct Wire {
 
 impl Default for Wire {
     fn default() -> Self {
-        let baud = board::SERIAL_BAUD;
-        Self { frames: Frames::default(), baud, wanted: baud }
+        Self { frames: Frames::default(), baud: baud::USUAL, wanted: baud::USUAL }
     }
 }
 
@@ -76,7 +74,7 @@ impl Console {
         drive: &mut impl Firmware,
         now_ms: u32,
     ) {
-        let usual = board::SERIAL_BAUD;
+        let usual = baud::USUAL;
         if self.wire.wanted != self.wire.baud {
             let wanted = self.wire.wanted;
             if self.flushed(port) && port.change_rate(wanted) {
@@ -87,9 +85,7 @@ impl Console {
                 }
             }
         } else if self.wire.baud != usual
-            && self
-                .line_ms
-                .is_some_and(|heard| now_ms.wrapping_sub(heard) > board::SERIAL_FALL_BACK_MS)
+            && self.line_ms.is_some_and(|heard| now_ms.wrapping_sub(heard) > baud::FALL_BACK_MS)
         {
             self.stop_stream(drive);
             self.wire.wanted = usual;

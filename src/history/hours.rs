@@ -2,11 +2,23 @@
 
 use defmt::Display2Format;
 use drive_core::State;
+use stm32g4xx_hal::pac::FLASH;
 
 use super::History;
 use crate::chip::flash::Pages;
 use crate::chip::watchdog::{Guard, extended};
 use crate::store::FlashError;
+
+/// Whether the flash has corrected an error since the last call.
+fn take_corrected() -> bool {
+    // SAFETY: FLASH always exists; only a flag that nothing else uses is read and cleared.
+    let errors = unsafe { &*FLASH::ptr() }.eccr();
+    let corrected = errors.read().eccc().bit();
+    if corrected {
+        errors.write(|w| w.eccc().set_bit());
+    }
+    corrected
+}
 
 /// The history, and the values for its next count.
 pub struct Hours {
@@ -28,6 +40,7 @@ impl Hours {
 
     /// Counts up to this time, ms, and writes when that is due.
     pub fn count(&mut self, now_ms: u32, off: bool, guard: &mut Guard, pages: &mut Pages) {
+        self.history.corrected += u32::from(take_corrected());
         self.history.pass(now_ms.wrapping_sub(self.counted_ms), !off);
         self.counted_ms = now_ms;
         if self.history.is_due(off) {

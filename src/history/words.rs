@@ -16,10 +16,11 @@ pub fn line(history: &History, i: usize) -> Option<impl fmt::Display> {
         let Some(fault) = fault.flatten() else {
             let (powered, running) = (hours(history.powered_s), hours(history.running_s));
             let starts = history.starts;
-            return write!(
-                f,
-                "powered {powered:.1} h, with current {running:.1} h, starts {starts}"
-            );
+            write!(f, "powered {powered:.1} h, with current {running:.1} h, starts {starts}")?;
+            return match history.corrected {
+                0 => Ok(()),
+                count => write!(f, "; errors of the flash corrected since the reset: {count}"),
+            };
         };
         let (code, at) = (fault.code, hours(60 * fault.powered_min));
         if code == CHANGED {

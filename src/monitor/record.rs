@@ -22,7 +22,8 @@ pub enum Reason {
     Code = 74,
     /// A bit of the coefficients has flipped; details: their hash now, and before.
     Coefficients = 75,
-    /// A configuration register has changed; details: address, its checked bits, those after the start.
+    /// A configuration register has changed; details: address, its checked bits, and those that have changed, its upper half on its
+    /// lower.
     Register = 77,
     /// A bit of the drive's state has flipped: its phase word is invalid, or it wants its outputs on although no start was taken;
     /// details: the word of the phase.

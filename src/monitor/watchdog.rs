@@ -1,12 +1,11 @@
 //! The rule by which the watchdog is fed.
 
-use crate::board;
+use crate::board::{self, PERIOD_TICKS};
 
 /// Least number of core cycles over which the rate of the control interrupt is judged: 12 control periods, 2 ms.
-pub const WINDOW_CYCLES: u32 = 12 * PERIOD_CYCLES;
-const PERIOD_CYCLES: u32 = 2 * board::PWM_TOP as u32;
+pub const WINDOW_CYCLES: u32 = 12 * PERIOD_TICKS;
 // The tolerance of a tenth covers one interrupt more or less, depending on the instant of the count.
-const _: () = assert!(WINDOW_CYCLES / 10 > PERIOD_CYCLES);
+const _: () = assert!(WINDOW_CYCLES / 10 > PERIOD_TICKS);
 // A wrong rate is detected within half the time of the watchdog.
 const _: () = assert!(WINDOW_CYCLES / board::CYCLES_PER_US * 2 < board::WATCHDOG_US);
 
@@ -50,7 +49,7 @@ impl FeedRule {
     pub fn judge(&mut self, cycles: u32, periods: u32, missed: bool) -> Verdict {
         let elapsed = cycles.wrapping_sub(self.cycles);
         let came = periods.wrapping_sub(self.periods);
-        let off = (u64::from(came) * u64::from(PERIOD_CYCLES)).abs_diff(u64::from(elapsed));
+        let off = (u64::from(came) * u64::from(PERIOD_TICKS)).abs_diff(u64::from(elapsed));
         let is_whole = elapsed >= WINDOW_CYCLES;
         self.refused |= missed || (is_whole && off * 10 > u64::from(elapsed));
         if self.refused {
@@ -59,7 +58,7 @@ impl FeedRule {
         if is_whole {
             self.restart(cycles, periods);
         }
-        let comes = is_whole || off <= u64::from(PERIOD_CYCLES);
+        let comes = is_whole || off <= u64::from(PERIOD_TICKS);
         if comes { Verdict::Feed } else { Verdict::Wait }
     }
 }
@@ -74,7 +73,7 @@ mod tests {
     fn it_is_fed_when_all_is_well() {
         let mut rule = FeedRule::new(u32::MAX - 5, u32::MAX);
         for period in 0..1200_u32 {
-            let cycles = (u32::MAX - 5).wrapping_add(period.wrapping_mul(PERIOD_CYCLES) + 700);
+            let cycles = (u32::MAX - 5).wrapping_add(period.wrapping_mul(PERIOD_TICKS) + 700);
             let verdict = rule.judge(cycles, u32::MAX.wrapping_add(period), false);
             assert_eq!(verdict, Verdict::Feed, "{period}");
         }
@@ -84,11 +83,11 @@ mod tests {
     #[test]
     fn it_waits_for_an_interrupt_that_is_late() {
         let mut rule = FeedRule::new(0, 0);
-        assert_eq!(rule.judge(3 * PERIOD_CYCLES, 2, false), Verdict::Feed);
-        assert_eq!(rule.judge(5 * PERIOD_CYCLES, 3, false), Verdict::Wait);
-        assert_eq!(rule.judge(6 * PERIOD_CYCLES, 6, false), Verdict::Feed);
-        assert_eq!(rule.judge(8 * PERIOD_CYCLES, 6, false), Verdict::Wait);
-        assert!(matches!(rule.judge(12 * PERIOD_CYCLES, 6, false), Verdict::Refuse { .. }));
+        assert_eq!(rule.judge(3 * PERIOD_TICKS, 2, false), Verdict::Feed);
+        assert_eq!(rule.judge(5 * PERIOD_TICKS, 3, false), Verdict::Wait);
+        assert_eq!(rule.judge(6 * PERIOD_TICKS, 6, false), Verdict::Feed);
+        assert_eq!(rule.judge(8 * PERIOD_TICKS, 6, false), Verdict::Wait);
+        assert!(matches!(rule.judge(12 * PERIOD_TICKS, 6, false), Verdict::Refuse { .. }));
     }
 
     #[test]
@@ -119,7 +118,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_tenth_more_or_less_is_the_limit(periods in 0_u32..40_000, cycles in WINDOW_CYCLES..1_000_000_000) {
-            let ratio = f64::from(periods) * f64::from(PERIOD_CYCLES) / f64::from(cycles);
+            let ratio = f64::from(periods) * f64::from(PERIOD_TICKS) / f64::from(cycles);
             prop_assume!((ratio - 0.9).abs() > 1e-6 && (ratio - 1.1).abs() > 1e-6);
             let fed = FeedRule::new(7, 9).judge(cycles + 7, periods + 9, false) == Verdict::Feed;
             prop_assert_eq!(fed, (0.9..1.1).contains(&ratio));

@@ -52,8 +52,6 @@ pub struct Board<'a> {
 }
 
 const TWICE: StartError = "started twice";
-/// While the control runs from one bank, the other is written.
-const ONE_BANK: StartError = "option bytes: the flash has one bank; set DBANK to 1";
 
 /// Sets everything up and starts the control interrupt. If the drive cannot be started, the outputs stay off, the log
 /// states the reason, and the console answers that the control does not run.
@@ -119,9 +117,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let link = apart(|| -> Result<ControlLink, StartError> {
         let mut pwm = pwm?;
         clocked?;
-        if !dual_bank {
-            return Err(ONE_BANK);
-        }
+        board::check_options(options)?;
         timed?;
         let coefficients = start.build(&timer);
         if let Some(why) = &start.rejected {

@@ -21,7 +21,7 @@ impl Check {
     /// The check of a running control; only the first call returns it.
     pub fn new() -> Option<Self> {
         // Filled outside the macro, which masks the interrupts, because the control runs already.
-        let expected = singleton!(: MaybeUninit<[u32; COUNT]> = MaybeUninit::uninit())?;
+        let expected = singleton!(: MaybeUninit<[u16; COUNT]> = MaybeUninit::uninit())?;
         let expected = expected.write([0; COUNT]);
         let (code, source) = memory::control_code();
         let (constants, changes) = control::constants();

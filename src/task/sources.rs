@@ -1,5 +1,6 @@
-//! Cross-checks of clock and reference voltage: the core clock against the watchdog's oscillator, the ADC reference voltage against the
-//! chip's own reference. If the crystal or the supply is off, currents, voltages, times and their limits are all wrong.
+//! Cross-checks of clock and reference voltage: the core clock against the two oscillators inside the chip, HSI and LSI, the ADC
+//! reference voltage against the chip's own reference. If the crystal or the supply is off, currents, voltages, times and their limits are
+//! all wrong.
 
 use core::sync::atomic::Ordering;
 
@@ -51,7 +52,7 @@ impl Sources {
 
     /// The errors that are present now and were at the previous measurement.
     fn measure(&mut self) -> Hardware {
-        let clocks = time::lsi_clocks().is_some_and(|n| board::clocks_agree(n, self.internal));
+        let clocks = time::captured().is_some_and(|n| board::clocks_agree(n, self.internal));
         let (code, then) = adc::own_reference();
         let references = board::references_agree(code, then);
         let mut found = Hardware::empty();

@@ -15,7 +15,6 @@ use hil_sim::experiments::drawn_machine::drawn;
 use induction_drive::board::protection;
 use stm32g4_unicorn::chip::Damage;
 use stm32g4_unicorn::circuit::Source as Pin;
-use stm32g4_unicorn::periph::flash::DBANK;
 use stm32g4_unicorn::rules::Rule;
 use virtual_board::board::rom::N_SWBOOT0;
 use virtual_board::board::snapshot::Snapshot;
@@ -191,7 +190,8 @@ fn at_the_bench(board: &mut Board, name: &str, value: &str) -> Result<Option<Opt
         ("crystal", _) => board.set_crystal(value != "stopped"),
         ("pll", _) => board.chip().rcc.pll_locks = value != "unlocked",
         ("flash cycles", [cycles]) => board.chip().flash_cycles = *cycles as u64,
-        ("single flash bank", _) => board.chip().flash.options &= !DBANK,
+        ("option bit", [bit]) => board.chip().flash.options ^= 1 << *bit as u32,
+        ("corrected flash error", _) => board.chip().flash.correct(),
         ("supply", [volts, ..]) => board.chip().set_supply(*volts),
         ("torn history", _) => board.chip().flash.tear(HISTORY),
         ("chopper", _) => {

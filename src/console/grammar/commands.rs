@@ -8,8 +8,8 @@ use super::request::{ListKind, Request};
 use super::{
     ParseError, Words, assigned, assignments, fault, prefix, recording, setting, step, whole,
 };
-use crate::board;
 use crate::boards;
+use crate::console::baud;
 use crate::console::suggest::nearest;
 use crate::desk::order::Order;
 use crate::log::LEVELS;
@@ -119,7 +119,7 @@ commands! { words;
             Some(signal) => Request::Stream(recording::stream(signal, words)?),
         };
     29: "baud", ["N", "bits per second; back to 115200 after a second without a valid line"] => {
-        let (what, min, max) = ("the bits per second", board::SERIAL_BAUD, board::SERIAL_BAUD_MAX);
+        let (what, min, max) = ("the bits per second", baud::USUAL, baud::HIGHEST);
         Request::Baud(whole(what, words.next(what)?, min, max)?)
     };
     30: "log", ["off|error|warn|info|debug", "how much goes to the log"] => Request::Log(words.one_of("the level", "off error warn info debug", &LEVELS)?);

@@ -158,6 +158,8 @@ defaults! {
         pub tim2: EncoderTimer,
         /// Time base.
         pub tim5: TimeBase,
+        /// Timer that captures MCO.
+        pub tim16: TimeBase = TimeBase::tim16(),
         /// ADC1 and ADC2.
         pub adc: Adc,
         /// ADC3 and ADC4.
@@ -207,7 +209,7 @@ impl<C: Circuit> Chip<C> {
             now accesses instructions keep_blocks watched forgiving rules flash_cycles
             analog net net_at comparator_offset break_pin break_pull_ohm break_low bus_driver damage clock_error reference_error
             pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers slow_adc.inputs grounded lifted tim1.drop_update tim2.position
-            rcc.flags rcc.crystal_hz rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line circuit tim5.captures
+            rcc.flags rcc.crystal_hz rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line circuit tim5.captures tim16.captures
             flash.bytes flash.torn flash.torn_code flash.operations flash.options
         }
         self.follow_break_pin();
@@ -219,7 +221,14 @@ impl<C: Circuit> Chip<C> {
         self.clock_error = error;
         let ticks = self.ticks_per_s() / lsi_hz;
         self.tim5.set_oscillator(ticks, self.now);
+        self.follow_hsi();
         self.iwdg.clock = (ticks as u64).min(NEVER >> 32);
+    }
+
+    /// Sets the edges of MCO, which is HSI divided by 16: it is exact beside a wrong crystal, and runs with a core that it drives.
+    pub(crate) fn follow_hsi(&mut self) {
+        let ticks = if self.rcc.on_crystal() { self.ticks_per_s() } else { TICKS_PER_S as f64 };
+        self.tim16.set_oscillator(16.0 * ticks / f64::from(rcc::HSI_HZ), self.now);
     }
 
     /// Number of ticks per second outside the chip.
@@ -250,6 +259,15 @@ impl<C: Circuit> Chip<C> {
     fn system_break(&mut self) {
         self.tim1.system_break();
         self.tim8.system_break();
+    }
+
+    /// Checks that ADC3 and ADC4 convert nothing while ADC1 or ADC2 samples a current.
+    pub(crate) fn check_beside(&mut self, at: u64) {
+        self.slow_adc.happen(at);
+        let free = !(self.adc.samples_current(at) && self.slow_adc.converts(at));
+        self.rules.require(free, Rule::AdcBeside, || {
+            "ADC3 or ADC4 converts while a current is sampled".into()
+        });
     }
 
     /// Updates level-sensitive interrupt requests.
@@ -299,6 +317,8 @@ impl<C: Circuit> Chip<C> {
                     let free = !self.adc.disturbs(at, output);
                     self.rules.require(free, Rule::AdcDisturbed, || "a trigger of TIM1".into());
                     self.adc.trigger(at, output);
+                    self.slow_adc.trigger(at, output);
+                    self.check_beside(at);
                 }
                 Event::Crest(at) => {
                     self.follow_pins();

@@ -48,6 +48,8 @@ rules! {
     JsqrStarted: "RM0440, ADC_JSQR and queue of context, JQDIS = 1",
     /// The trigger of an injected sequence comes in the middle of a regular conversion: channel 0 may be converted instead.
     AdcDisturbed: "ES0430, ADC channel 0 converted instead of the required channel",
+    /// ADC3 or ADC4 converts while ADC1 or ADC2 samples a current: its noise is in the result.
+    AdcBeside: "ES0430, 2.7.9",
     /// The chip's internal reference is sampled for less than 4 us.
     OwnReference: "DS12288, ts_vrefint",
     /// A register of the watchdog is written while its last value is still being transferred: the write is lost.

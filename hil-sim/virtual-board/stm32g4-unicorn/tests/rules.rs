@@ -430,6 +430,23 @@ fn a_trigger_finds_no_regular_conversion() {
     twins(Rule::AdcDisturbed, &[&begun, &convert(13_300)], &[&begun, &convert(12_000)]);
 }
 
+/// ADC1 samples a current from 14 000 ticks on. ADC3 converts for 653 clocks, which are 2612 ticks.
+#[test]
+fn slow_inputs_are_converted_beside_no_current() {
+    const ADC3: u32 = ADC1 + 0x400;
+    let third = |step: &Step| match *step {
+        Write(at @ ADC1..ADC3, value) => Write(at + 0x400, value),
+        Write(AHB2ENR, _) => Write(AHB2ENR, 3 << 13),
+        other => other,
+    };
+    let on: Vec<_> = [ADC_ON, CALIBRATED, READY].concat().iter().map(third).collect();
+    let both_on = Write(AHB2ENR, 3 << 13);
+    let first = regular_beside_injected(6);
+    let begun = [&on[..], &[Write(ADC3 + 0x14, 7), both_on], &first[1..]].concat();
+    let convert = |after| [Wait(after), Write(ADC3 + 8, REGULATOR | 1 << 2), Wait(10_000)];
+    twins(Rule::AdcBeside, &[&begun, &convert(12_000)], &[&begun, &convert(10_000)]);
+}
+
 #[test]
 fn the_reference_inside_is_sampled_for_long() {
     let [short, long] = [5, 6].map(regular_beside_injected);

@@ -222,7 +222,7 @@ impl Class {
                 what = set_clocks(board, 0.0, hz[rng.random_range(0..3_usize)]);
             }
             "crystal off its frequency" => {
-                let error = rng.random_range(0.12..0.3);
+                let error = rng.random_range(0.04..0.3);
                 what = set_clocks(board, if rng.random() { error } else { -error }, LSI_HZ);
             }
             "reference voltage off" => {

@@ -2,7 +2,7 @@
 //! the page of its results lists every class.
 
 use anyhow::{Context, Result};
-use induction_drive::monitor::register_check::control;
+use induction_drive::monitor::register_check::{control, halves};
 use virtual_board::Board;
 use virtual_board::power_stage::REFERENCE;
 
@@ -50,8 +50,8 @@ fn expect_as_it_is(board: &mut Board, address: u32) {
     let table = "induction_drive::task::check::Check::new::{closure#0}::VAR";
     let table = board.image.symbol(table).expect("it is in the image").address;
     for (n, register) in control().enumerate().filter(|(_, r)| r.address == address) {
-        let value = board.chip().read(address, 4) & register.mask;
-        board.cpu.write(table + 4 * n as u32, &value.to_le_bytes());
+        let halves = halves(board.chip().read(address, 4) & register.mask);
+        board.cpu.write(table + 2 * n as u32, &halves.to_le_bytes());
     }
 }
 

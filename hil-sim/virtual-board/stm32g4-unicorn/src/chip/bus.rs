@@ -29,6 +29,7 @@ clocked! {
     TIM8 = 0x4001_3400, APB2ENR, 13;
     TIM2 = 0x4000_0000, APB1ENR1, 0;
     TIM5 = 0x4000_0c00, APB1ENR1, 3;
+    TIM16 = 0x4001_4400, APB2ENR, 17;
     WWDG = 0x4000_2c00, APB1ENR1, 11;
     GPIOA = 0x4800_0000, AHB2ENR, 0;
     GPIOB = 0x4800_0400, AHB2ENR, 1;
@@ -142,6 +143,7 @@ impl<C: Circuit> Chip<C> {
             TIM2 => self.tim2.read(offset),
             TIM8 => self.tim8.0.read(offset),
             TIM5 => self.tim5.read(offset, now, self.rcc.lsi_on()),
+            TIM16 => self.tim16.read(offset, now, self.rcc.hsi_on_mco()),
             FACTORY if offset == 0x1a8 => Some(u32::from(OWN_REFERENCE_CODE) << 16),
             RCC => self.rcc.read(offset),
             PWR => self.pwr.read(offset),
@@ -197,6 +199,7 @@ impl<C: Circuit> Chip<C> {
             TIM2 => self.tim2.write(offset, value)?,
             TIM8 => self.tim8.0.write(offset, value)?,
             TIM5 => self.tim5.write(offset, value, now)?,
+            TIM16 => self.tim16.write(offset, value, now)?,
             RCC => self.rcc.write(offset, value, On { at: now, accesses: self.accesses })?,
             PWR => self.pwr.write(offset, value, locked)?,
             FLASH => self.flash.write(offset, value, rules)?,
@@ -240,7 +243,9 @@ impl<C: Circuit> Chip<C> {
                 self.require_pin(pins::SERIAL[0], "LPUART1_TDR is written");
             }
             USART3 if offset == uart::TDR => self.check_bus_pins(),
+            ADC345 => self.check_beside(self.now),
             RCC | FLASH => {
+                self.follow_hsi();
                 self.adc.kernel_clock = self.rcc.adc_kernel_clock();
                 self.scs.systick.cycle = self.rcc.ticks_per_cycle;
                 self.check_clocks();

@@ -54,7 +54,7 @@ impl Adc {
         }
     }
 
-    /// Processes a rising edge of a trigger output of TIM1, 0 or 1.
+    /// Processes an edge of a trigger output of TIM1: a rising one, 0 or 1, or the falling one of output 1, 2.
     pub fn trigger(&mut self, at: u64, output: usize) {
         let Some(clock) = self.clock() else { return };
         for (n, one) in self.converters.iter_mut().enumerate() {
@@ -76,6 +76,17 @@ impl Adc {
     /// Whether a trigger at this time starts a sequence in the middle of a regular conversion.
     pub fn disturbs(&self, at: u64, output: usize) -> bool {
         self.converters.iter().any(|one| one.disturbs(at, output))
+    }
+
+    /// Whether any ADC samples the first channel of a sequence, which is a current, right behind this time.
+    pub fn samples_current(&self, at: u64) -> bool {
+        let clock = self.clock().unwrap_or(1);
+        self.converters.iter().any(|one| one.sampling_first_until(clock) > at)
+    }
+
+    /// Whether any ADC converts something right behind this time.
+    pub fn converts(&self, at: u64) -> bool {
+        self.converters.iter().any(|one| (at + 1..NEVER).contains(&one.conversion_until()))
     }
 
     /// Whether TIM1 starts regular conversions.

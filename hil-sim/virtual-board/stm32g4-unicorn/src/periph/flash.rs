@@ -18,7 +18,7 @@ offsets! { ACR = 0x00, KEYR = 0x08, SR = 0x10, CR = 0x14, ECCR = 0x18, OPTR = 0x
 bits! { DCEN = 10 }
 bits! { PG = 0, PER = 1, BKER = 11, STRT = 16, LOCK = 31 }
 bits! { EOP = 0, PROGERR = 3, SIZERR = 6, PGSERR = 7, BSY = 16 }
-bits! { ECCD = 31 }
+bits! { ECCC = 30, ECCD = 31 }
 /// Option: two banks of pages of 2 KiB, or one bank of pages of 4 KiB.
 pub const DBANK: u32 = 1 << 22;
 /// Option bytes from the factory.
@@ -77,6 +77,11 @@ impl Flash {
     /// Returns the supply, V, below which the chip is held in reset.
     pub fn brown_out_v(&self) -> f64 {
         BROWN_OUT[(self.options >> 8 & 7) as usize]
+    }
+
+    /// Notes an error that the check code has corrected.
+    pub fn correct(&mut self) {
+        self.eccr |= ECCC;
     }
 
     /// Gives a double word of the stored part a wrong check code.

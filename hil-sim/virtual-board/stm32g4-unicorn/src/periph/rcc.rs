@@ -12,7 +12,7 @@ offsets! {
 }
 
 // CR, CIFR.
-bits! { HSEON = 16, CSSON = 19 }
+bits! { HSION = 8, HSEON = 16, CSSON = 19 }
 bits! { CSSF = 8 }
 // Flags of resets in CSR: reset pin, power, software, watchdogs.
 bits! { PIN = 26, BOR = 27, SFT = 28, IWDG = 29, WWDG = 30 }
@@ -96,6 +96,16 @@ impl Rcc {
     /// Whether the LSI oscillator is on.
     pub fn lsi_on(&self) -> bool {
         self.store.get(CSR) & 1 != 0
+    }
+
+    /// Whether MCO gives HSI divided by 16.
+    pub fn hsi_on_mco(&self) -> bool {
+        self.store.get(CFGR) >> 24 == 0x43 && self.store.get(CR) & HSION != 0
+    }
+
+    /// Whether the crystal is the source of the PLL.
+    pub fn on_crystal(&self) -> bool {
+        self.store.get(PLLCFGR) & 3 == 3
     }
 
     /// Whether ADC1 and ADC2 have a clock of their own.

@@ -1,7 +1,7 @@
 //! TIM1 in centre-aligned mode, with three legs (RM0440, section 28).
 //!
-//! The counter is not stepped: its value follows from time. Events are its two ends and the rising edges of OC4REF on
-//! the way up and of OC6REF on the way down, which are the trigger outputs 1 and 2 to the ADCs; alternatively the
+//! The counter is not stepped: its value follows from time. Events are its two ends and the rising edge of OC4REF on
+//! the way up and both edges of OC6REF around 0, which are the trigger outputs 1 and 2 to the ADCs; alternatively the
 //! update is output 1.
 
 mod outputs;
@@ -23,7 +23,7 @@ bits! { OSSI = 10, OSSR = 11, BKE = 12, BKP = 13, MOE = 15 }
 /// An event and its time.
 #[derive(Clone, Copy, Debug)]
 pub enum Event {
-    /// A rising edge of a trigger output, 0 or 1.
+    /// A rising edge of a trigger output, 0 or 1; 2 is the falling edge of output 1.
     Trigger(u64, usize),
     /// The counter is at its top.
     Crest(u64),
@@ -47,8 +47,8 @@ defaults! {
         /// Next end of the count, and whether it is the top.
         next_end: u64 = NEVER,
         at_top_next: bool = true,
-        /// Time of the next rising edge of each trigger output.
-        trigger_at: [u64; 2] = [NEVER; 2],
+        /// Time of the next edge of each kind.
+        trigger_at: [u64; 3] = [NEVER; 3],
         /// Level of the break pin; `None` is uncertain.
         break_pin: Option<bool> = Some(true),
         /// Outputs of the comparators.
@@ -140,8 +140,10 @@ impl Tim1 {
 
     /// Processes the next event.
     pub fn happen(&mut self) -> Event {
-        if let Some(output) = self.trigger_at.iter().position(|at| *at <= self.next_end) {
-            return Event::Trigger(std::mem::replace(&mut self.trigger_at[output], NEVER), output);
+        let first = self.trigger_at.into_iter().enumerate().min_by_key(|(_, at)| *at);
+        if let Some((output, at)) = first.filter(|(_, at)| *at <= self.next_end) {
+            self.trigger_at[output] = NEVER;
+            return Event::Trigger(at, output);
         }
         let crest = self.at_top_next;
         self.at_top_next = !crest;
@@ -164,10 +166,12 @@ impl Tim1 {
         Event::Valley(end)
     }
 
-    /// Plans the rising edge of OC4REF, which comes on the way up when the counter reaches its compare value.
+    /// Plans the edges on the way up, where the counter reaches a compare value: OC4REF rises, OC6REF falls.
     fn plan_trigger(&mut self) {
-        let after = self.rises_after(0, self.active[3]);
-        self.trigger_at[0] = after.map_or(NEVER, |ticks| self.from + ticks);
+        let after =
+            [self.rises_after(0, self.active[3]), self.rises_after(1, self.store.get(CCR6))];
+        let [rises, falls] = after.map(|ticks| ticks.map_or(NEVER, |ticks| self.from + ticks));
+        (self.trigger_at[0], self.trigger_at[2]) = (rises, falls);
     }
 
     /// Returns the ticks between the counter at 0 and the edge of a trigger output at this compare value; none if there is no edge.
@@ -306,7 +310,7 @@ impl Tim1 {
             CR1 if old & !value & 1 != 0 => {
                 self.held = self.count(now).0;
                 self.next_end = NEVER;
-                self.trigger_at = [NEVER; 2];
+                self.trigger_at = [NEVER; 3];
             }
             ARR if self.store.get(CR1) & 1 << 7 == 0 => self.top = value.max(1),
             CCR1..=CCR4 => {

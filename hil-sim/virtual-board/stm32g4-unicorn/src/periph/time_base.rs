@@ -1,5 +1,5 @@
-//! TIM5 as time base (RM0440, section 30): it counts core clocks up while it is enabled, also while the core sleeps or
-//! is halted. Channel 1 captures every eighth edge of the LSI oscillator.
+//! TIM5 and TIM16 as time bases (RM0440, sections 30 and 31): they count core clocks up while they are enabled, also while
+//! the core sleeps or is halted. Channel 1 captures every eighth edge of an oscillator inside the chip.
 
 use super::{Effect, Store, bits, offsets};
 
@@ -27,6 +27,10 @@ defaults! {
     #[derive(Clone, Debug)]
     pub struct TimeBase {
         store: Store = Store::of("TIM5"),
+        /// The number of the input with the oscillator (TISEL).
+        input: u32 = 1,
+        /// Bits of the counter.
+        bits: u32 = u32::MAX,
         /// Time at which the counter was 0.
         from: u64,
         pub(crate) captures: Captures,
@@ -34,6 +38,11 @@ defaults! {
 }
 
 impl TimeBase {
+    /// Makes TIM16, whose input 2 is MCO.
+    pub fn tim16() -> Self {
+        Self { store: Store::of("TIM16"), input: 2, bits: 0xffff, ..Self::default() }
+    }
+
     /// Accounts for a stop of its clock for some ticks.
     pub fn delay(&mut self, ticks: u64) {
         self.from += ticks;
@@ -51,11 +60,11 @@ impl TimeBase {
         // The counter is read in loops.
         if offset == CNT {
             let counts = self.store.get(CR1) & 1 != 0;
-            return Some(if counts { (now - self.from) as u32 } else { 0 });
+            return Some(if counts { (now - self.from) as u32 & self.bits } else { 0 });
         }
-        // Input 1 on channel 1, every eighth edge; the input is the oscillator.
+        // TI1 on channel 1, every eighth edge; the input is the oscillator.
         let (mode, input) = (self.store.get(CCMR1) & 0xff, self.store.get(TISEL) & 15);
-        let on = oscillates && self.store.get(CCER) & 1 != 0 && (mode, input) == (0xd, 1);
+        let on = oscillates && self.store.get(CCER) & 1 != 0 && (mode, input) == (0xd, self.input);
         let captures = &mut self.captures;
         let count = if on { captures.so_far(now) as u64 } else { captures.read };
         match offset {
@@ -68,7 +77,7 @@ impl TimeBase {
                 captures.read = count;
                 let (at, before) = captures.from;
                 let ticks = (count as f64 - before) * captures.ticks;
-                Some((at as f64 + ticks - self.from as f64) as i64 as u32)
+                Some((at as f64 + ticks - self.from as f64) as i64 as u32 & self.bits)
             }
             _ => self.store.read(offset),
         }

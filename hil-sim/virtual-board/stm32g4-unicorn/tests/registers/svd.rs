@@ -7,11 +7,12 @@ use std::sync::OnceLock;
 use anyhow::{Context, Result, ensure};
 
 /// Module of the access crate, name in `stm32-metapac`, base address. ADC2 is like ADC1.
-pub const BLOCKS: [(&str, &str, u32); 24] = [
+pub const BLOCKS: [(&str, &str, u32); 25] = [
     ("tim1", "TIM1", 0x4001_2c00),
     ("tim1", "TIM8", 0x4001_3400),
     ("tim2", "TIM2", 0x4000_0000),
     ("tim5", "TIM5", 0x4000_0c00),
+    ("tim16", "TIM16", 0x4001_4400),
     ("iwdg", "IWDG", 0x4000_3000),
     ("wwdg", "WWDG", 0x4000_2c00),
     ("pwr", "PWR", 0x4000_7000),

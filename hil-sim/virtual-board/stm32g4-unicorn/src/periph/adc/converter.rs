@@ -81,11 +81,25 @@ impl Converter {
         self.status & self.store.get(IER) != 0
     }
 
-    /// Whether a rising edge of a trigger output of TIM1 starts a sequence.
+    /// Whether an edge of a trigger output of TIM1 starts a sequence.
     pub fn waits_for(&self, sequence: Sequence, output: usize) -> bool {
-        let code = [[9, 10], [0, 8]][sequence as usize][output];
+        let code = [[9, 10, 10], [0, 8, 8]][sequence as usize][output];
+        let edge = [1, 1, 2][output];
         let idle = self.running[sequence as usize].done_at == NEVER;
-        self.control & sequence.started() != 0 && idle && self.selection(sequence) == 1 << 5 | code
+        self.control & sequence.started() != 0
+            && idle
+            && self.selection(sequence) == edge << 5 | code
+    }
+
+    /// Returns the end of the sampling of the first channel of a sequence that is in progress; otherwise 0.
+    pub fn sampling_first_until(&self, clock: u64) -> u64 {
+        let first = self.running.iter().filter(|one| one.done_at < NEVER && one.rank == 0);
+        first.map(|one| one.done_at - CONVERSION * clock / 2).max().unwrap_or(0)
+    }
+
+    /// Returns the end of the conversion in progress.
+    pub fn conversion_until(&self) -> u64 {
+        self.running[0].done_at.min(self.running[1].done_at)
     }
 
     /// Whether a trigger at this time starts the injected sequence in the middle of a regular conversion.
