@@ -81,7 +81,7 @@ faults! {
     NotCaught = 47, "the flying start failed";
     Stalled = 48, "the motor stays at its current limit and hardly turns";
     ChopperOff = 49, "the chip has switched the brake chopper off";
-    WrongClock = 50, "the core clock and the clock of the watchdog do not agree";
+    WrongClock = 50, "the core clock and the chip's own oscillators do not agree";
     WrongReference = 51, "the reference voltage of the ADCs is wrong";
     SensorSilentA = 52, "no change in current sensor a while the current rotates: open or stuck";
     SensorSilentB = 53, "no change in current sensor b while the current rotates: open or stuck";
