@@ -14,8 +14,8 @@ use fixed::types::I0F32;
 /// ```
 /// use induction_drive_core::Angle;
 ///
-/// let sum = Angle::from_degrees(170.0) + Angle::from_degrees(20.0);
-/// assert!((sum.to_degrees() + 170.0).abs() < 1e-4);
+/// let sum = Angle::from_turns(0.45) + Angle::from_turns(0.1);
+/// assert!((sum.to_turns() + 0.45).abs() < 1e-6);
 /// let axis = Angle::QUARTER.unit_vector();
 /// assert!(axis.cos.abs() < 2e-5 && (axis.sin - 1.0).abs() < 2e-5);
 /// ```
@@ -36,7 +36,7 @@ impl Angle {
     pub const EIGHTH: Self = Self::from_bits(1 << 29);
 
     /// Returns the angle of `bits` / 2^32 turns.
-    pub const fn from_bits(bits: i32) -> Self {
+    pub(crate) const fn from_bits(bits: i32) -> Self {
         Self(Wrapping(I0F32::from_bits(bits)))
     }
 

@@ -7,9 +7,9 @@
 //! ```
 //! use induction_drive_core::{Abc, Angle};
 //!
-//! // A balanced set with peak 2 at angle 0, in the frame of a flux at 30°: it lies 30° behind d.
+//! // A balanced set with peak 2 at angle 0, in the frame of a flux at 30°, a twelfth of a turn: it lies 30° behind d.
 //! let i = Abc::new(2.0, -1.0, -1.0).to_alpha_beta();
-//! let dq = i.to_dq(Angle::from_degrees(30.0).unit_vector());
+//! let dq = i.to_dq(Angle::from_turns(1.0 / 12.0).unit_vector());
 //! assert!((dq.d - 1.732).abs() < 1e-3 && (dq.q + 1.0).abs() < 1e-3);
 //! ```
 
@@ -124,7 +124,7 @@ impl AlphaBeta {
     }
 
     /// Applies the Park transformation, Eq. 2.5 / 2.6, into the frame whose d axis lies along `axis`.
-    pub(crate) fn to_dq(self, axis: UnitVector) -> Dq {
+    pub fn to_dq(self, axis: UnitVector) -> Dq {
         let (d, q) = self.seen_from(axis);
         Dq { d, q }
     }
