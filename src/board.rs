@@ -322,16 +322,16 @@ pub const COMPARABLE: u16 = 410;
 /// 10 000 counts a turn at 1440 rpm come every 4.2 us.
 pub const ENCODER_FILTER: u8 = 0b1000;
 
-// Recording -----------------------------------------------------------------------------------
+// Console and recording -----------------------------------------------------------------------
 
+/// Bits per second of the console after a reset; 8 data bits, no parity, 1 stop bit.
+pub const SERIAL_BAUD: u32 = 115_200;
+/// Ticks of LPUART1's clock, Hz, per bit, in 1/256 (RM0440, LPUART_BRR), rounded.
+pub const fn serial_divider(clock_hz: u32, baud: u32) -> u32 {
+    ((256 * clock_hz as u64 + baud as u64 / 2) / baud as u64) as u32
+}
 /// Records of the longest trace, 32 bytes each.
 pub const TRACE_RECORDS: usize = 1024;
-/// Size of the ring of control periods for stream, identification and commissioning in the main loop. It holds one less: 5.2 ms if every
-/// period is recorded. The watchdog allows the main loop to be late by less, even with its slowest clock.
-pub const RECORDED_PERIODS: usize = 32;
-const _: () = assert!(
-    (RECORDED_PERIODS as u32 - 1) * WATCHDOG_HZ > (WATCHDOG_RELOAD as u32 + 1) * 4 * PWM_HZ
-);
 /// Longest wait for the answer to a command, us: one period of ten takes it, within 1.7 ms.
 pub const ANSWER_TIMEOUT_US: u32 = 3000;
 const _: () = assert!(ANSWER_TIMEOUT_US > 11 * 1_000_000 / PWM_HZ);
@@ -339,7 +339,7 @@ const _: () = assert!(ANSWER_TIMEOUT_US > 11 * 1_000_000 / PWM_HZ);
 // Watchdog ------------------------------------------------------------------------------------
 
 /// Slowest clock of the watchdog, Hz (datasheet: 32 kHz, 29.5 to 34 kHz over all conditions).
-const WATCHDOG_HZ: u32 = 29_500;
+pub const WATCHDOG_HZ: u32 = 29_500;
 /// Fastest clock, Hz.
 const WATCHDOG_HZ_MAX: u32 = 34_000;
 /// The PR field: divided by 4.

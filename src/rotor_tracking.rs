@@ -109,7 +109,7 @@ mod tests {
     use hil_sim::rig::Rig;
 
     use super::*;
-    use crate::recording::ring::Ring;
+    use crate::recording::ring::{self, Ring};
 
     /// A drive at 2 A on a locked shaft whose rotor has 30 % more resistance than in the settings, and its tracking.
     fn tracked() -> (Rig, Tracking) {
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn a_main_loop_that_comes_too_late_begins_anew() {
         let (mut rig, mut tracking) = tracked();
-        let mut ring = Ring::<{ board::RECORDED_PERIODS }>::new();
+        let mut ring = Ring::<{ ring::PERIODS }>::new();
         let (mut writer, mut reader) = ring.split();
         let (mut orders, mut taken) = (Vec::new(), 0);
         for n in 0..60_000_u32 {
@@ -181,7 +181,7 @@ mod tests {
             }
         }
         // The rest of the pause, and of the pass before it, does not fit.
-        assert_eq!(taken, 60_000 - 120 + board::RECORDED_PERIODS - 1);
+        assert_eq!(taken, 60_000 - 120 + ring::PERIODS - 1);
         let (before, after): (Vec<u32>, Vec<u32>) = orders.iter().partition(|n| **n < 30_000);
         assert!(before.len() > 15 && after.len() > 15, "{orders:?}");
         // The memory of the least squares is filled again first.

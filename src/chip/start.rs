@@ -15,7 +15,6 @@ use core::arch::global_asm;
 use crate::board;
 use crate::boards::SELECTED;
 use crate::boards::identity::Identity;
-use crate::console::baud;
 
 // SAFETY: in the first page of the flash, between functions; nothing but tools reads it there.
 #[used]
@@ -122,5 +121,5 @@ global_asm!(
     aircr = const 0xe000_ed0c_u32,
     reset = const 0x05fa_0004_u32,
     system = const 0x1fff_0000_u32,
-    divider = const baud::divider(board::HSI_HZ, baud::USUAL),
+    divider = const board::serial_divider(board::HSI_HZ, board::SERIAL_BAUD),
 );

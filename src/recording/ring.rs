@@ -12,6 +12,13 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use drive_core::Telemetry;
 
 use super::trace::Sampled;
+use crate::board::{PWM_HZ, WATCHDOG_HZ, WATCHDOG_RELOAD};
+
+/// Size of the ring for stream, identification and commissioning in the main loop, control periods. It holds one less: 5.2 ms if every
+/// period is recorded. The watchdog allows the main loop to be late by less, even with its slowest clock.
+pub const PERIODS: usize = 32;
+const _: () =
+    assert!((PERIODS as u32 - 1) * WATCHDOG_HZ > (WATCHDOG_RELOAD as u32 + 1) * 4 * PWM_HZ);
 
 /// Signals of the drive in one control period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -6,7 +6,7 @@ use drive_core::io::PERIOD_S;
 use drive_settings::Settings;
 use drive_stream::{Frame, LONGEST, MOST_SIGNALS, wire_bytes};
 
-use super::ring::Record;
+use super::ring::{self, Record};
 use super::trace::{self, SIGNALS, SignalChoice};
 use crate::board;
 
@@ -86,7 +86,7 @@ impl Frames {
         freq: f32,
     ) -> bool {
         // At most as many frames as the ring holds, so that the main loop goes on.
-        for _ in 0..=board::RECORDED_PERIODS {
+        for _ in 0..=ring::PERIODS {
             if self.waiting == 0 {
                 let Some(record) = next() else { return true };
                 self.make(&record, settings, freq);

@@ -30,7 +30,7 @@ use induction_drive::link::{Answer, Status};
 use induction_drive::modbus;
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict, WINDOW_CYCLES};
-use induction_drive::recording::ring::Ring;
+use induction_drive::recording::ring::{self, Ring};
 use induction_drive::recording::trace::Trace;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::Saved;
@@ -282,7 +282,7 @@ fn start_control(
     let (send_answers, answers) = answers.split();
     let (send_learned, learned) = learned.split();
     let (recorder, trace) = TRACE_MEMORY.take().ok_or(TWICE)?;
-    let ring = singleton!(: Ring<{ board::RECORDED_PERIODS }> = Ring::new()).ok_or(TWICE)?;
+    let ring = singleton!(: Ring<{ ring::PERIODS }> = Ring::new()).ok_or(TWICE)?;
     let (signals, reported) = ring.split();
 
     adc.convert_both(coefficients.front_end.both_zero_vectors);

@@ -23,7 +23,7 @@ use induction_drive::chip::stage::Stage;
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::MemoryRange;
-use induction_drive::recording::ring::Writer;
+use induction_drive::recording::ring::{self, Writer};
 use induction_drive::recording::trace::{Recorder, Sampled};
 
 /// The drive and its surroundings, owned by the interrupt.
@@ -44,7 +44,7 @@ pub struct Control {
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
     /// Signals for the report, the stream, the identification of the rotor time constant, and the commissioning.
-    pub signals: Writer<'static, { board::RECORDED_PERIODS }>,
+    pub signals: Writer<'static, { ring::PERIODS }>,
 }
 
 // The drive is copied at a start and by tools. (The loop of the dissertation takes more.)

@@ -37,7 +37,7 @@ use induction_drive::store::{FlashError, Saved};
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), ", commit ", env!("GIT_HASH"));
 
 /// Signals of the control interrupt.
-pub type Signals = ring::Reader<'static, { board::RECORDED_PERIODS }>;
+pub type Signals = ring::Reader<'static, { ring::PERIODS }>;
 
 /// The main loop's ends of the communication with the control interrupt.
 pub struct ControlLink {
