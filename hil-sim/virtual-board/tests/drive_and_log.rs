@@ -9,6 +9,7 @@ use hil_sim::Config;
 use hil_sim::config::LoadMode;
 use induction_drive::coefficients::{ADDRESS, Designed, LONGEST};
 use induction_drive::settings::FirmwareSettings;
+use virtual_board::board::TICKS_PER_PERIOD;
 use virtual_board::image::Segment;
 use virtual_board::{Board, Image, Options};
 
@@ -52,7 +53,10 @@ impl Small {
             let mut byte = [0];
             self.board.read(self.run, &mut byte);
             self.board.run_periods(1)?;
+            let mut late = 0;
             while let Some(period) = self.board.next_period() {
+                // Late in a period the main loop has done its work.
+                late = period.began + TICKS_PER_PERIOD * 9 / 10;
                 let compare = self.host.period(&mut self.front_end, &period.sample, &mut |_| {}).0;
                 let (n, state) = (self.compared, self.host.state());
                 ensure!(
@@ -70,6 +74,8 @@ impl Small {
                     commands.iter().try_for_each(|command| self.host.command(command).map(drop))?;
                 }
             }
+            let now = self.board.chip().now;
+            self.board.run_ticks(late.saturating_sub(now))?;
         }
         self.log += &self.board.take_log()?.join("\n");
         Ok(())
