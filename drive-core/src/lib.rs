@@ -46,8 +46,8 @@
 //! * Sample `k` acts in period `k + 1`: see [`io`].
 #![cfg_attr(not(test), no_std)]
 
-// Hidden from the documentation, and no part of what a release has to keep, are the blocks, their coefficients and homing: the design in
-// the sibling crates, the firmware and the laboratory of this project use them. A program that runs a drive needs none of them.
+// The blocks, their coefficients and homing are hidden from the documentation, and every release may change them. The sibling crates, the
+// firmware and the laboratory of this project use them; a program that runs a drive needs none of them.
 #[doc(hidden)]
 pub mod blocks;
 #[doc(hidden)]

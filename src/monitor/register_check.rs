@@ -87,7 +87,7 @@ const PARTS: [(u32, u32); 18] = [
     // The memory at address 0; the faults that break.
     (0x4001_0000, 7),
     (0x4001_001c, 0xf),
-    // Which bits of a priority preempt; that the state of the floating point is saved, when it is needed.
+    // AIRCR.PRIGROUP says which priorities preempt others. FPCCR.ASPEN and LSPEN make exceptions save the registers of the FPU.
     (0xe000_ed0c, 7 << 8),
     (0xe000_ef34, 3 << 30),
     (0xe000_e410, 0xff << 16),
