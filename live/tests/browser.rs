@@ -219,7 +219,7 @@ fn shows_signals(page: &mut Page<'_>) {
     assert!((peak - i_d.hypot(i_q)).abs() < 0.5, "{peak} A, {i_d} A, {i_q} A");
     assert!((last(page, "heat_sink_c") - 25.0).abs() < 2.0);
     assert_eq!((last(page, "state"), last(page, "limit")), (2.0, 0.0));
-    page.until("/state:?\\s*running/.test($('curves').innerText) && /limit:?\\s*none/.test($('curves').innerText)", PATIENCE);
+    page.until("/state:?\\s*running/.test($('curves').innerText) && /limited by:?\\s*none/.test($('curves').innerText)", PATIENCE);
 }
 
 /// No peak of a sample disappears if many samples share a pixel.
