@@ -123,6 +123,17 @@ impl DcLink {
 }
 
 impl Plant {
+    /// Connects another rectifier and capacitor; the link keeps its voltage.
+    ///
+    /// # Errors
+    /// [`PlantError`] with the setting that is refused.
+    pub fn set_supply(&mut self, settings: &DcLinkSettings) -> Result<(), PlantError> {
+        settings.check()?;
+        self.dc_link.settings = *settings;
+        self.moves |= settings.moves();
+        Ok(())
+    }
+
     /// Changes only the peak of the rectified mains, V; a capacitor behind the rectifier keeps its voltage. Without a
     /// capacitor it does the same as [`Self::set_dc_link`].
     ///

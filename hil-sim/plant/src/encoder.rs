@@ -21,7 +21,8 @@ pub enum EncoderFault {
     None,
     /// The counter does not move: a disconnected cable, or one dead channel.
     Stuck,
-    /// This fraction of the counts is lost, 0 to 1: a slipping coupling, a dirty disc.
+    /// This fraction of the counts is lost, 0 to 1: a slipping coupling, a dirty disc. Below 0, down to -1, further
+    /// counts are added: interference on both channels.
     Losing(f64),
 }
 
@@ -53,7 +54,7 @@ impl Encoder {
             EncoderFault::None => {}
             EncoderFault::Stuck => self.lost += position - self.position,
             EncoderFault::Losing(fraction) => {
-                self.lost += fraction.clamp(0.0, 1.0) * (position - self.position);
+                self.lost += fraction.clamp(-1.0, 1.0) * (position - self.position);
             }
         }
         self.position = position;

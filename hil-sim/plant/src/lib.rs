@@ -133,6 +133,7 @@ impl Plant {
                 sensors: Sensors::new(&settings.measurement)?,
                 substeps: settings.substeps,
                 open: None,
+                dead: None,
                 taken: 0.0,
                 volt_seconds: Complex::ZERO,
             },
@@ -384,6 +385,12 @@ impl Plant {
         }
         self.around.open = phase;
         Ok(())
+    }
+
+    /// Keeps the high side, the low side or both of a leg, 0 to 2, off whatever is commanded, or lets all gates work. It
+    /// acts on the averaged inverter.
+    pub fn set_dead_gates(&mut self, dead: Option<(usize, [bool; 2])>) {
+        self.around.dead = dead.map(|(leg, off)| (leg.min(2), off));
     }
 
     /// Sets the fault of the encoder.

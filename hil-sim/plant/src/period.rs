@@ -3,7 +3,7 @@
 use drive_core::Compare;
 
 use crate::averaged::RealSwitches;
-use crate::complex::Complex;
+use crate::complex::{Complex, phases};
 use crate::integrate::MotorModel;
 use crate::inverter::Inverter;
 use crate::model::{ElectricalState as _, MachineModel};
@@ -23,6 +23,8 @@ pub(crate) struct Around {
     pub substeps: u32,
     /// The interrupted phase, 0 to 2.
     pub open: Option<usize>,
+    /// A leg, 0 to 2, and whether its high and low side stay off whatever is commanded.
+    pub dead: Option<(usize, [bool; 2])>,
     /// Energy that inverter and motor have taken from the dc link in the last period, J.
     pub taken: f64,
     /// Terminal voltage integrated over the last period, V s.
@@ -43,6 +45,8 @@ impl Around {
         (self.taken, self.volt_seconds) = (0.0, Complex::ZERO);
         if !compare.enabled {
             self.freewheel(motor, period);
+        } else if let Some((leg, off)) = self.dead {
+            self.with_dead_gates(motor, compare, period, leg, off);
         } else if self.inverter.settings.switched {
             match self.open {
                 None => self.switched(All, motor, compare, period),
@@ -92,6 +96,43 @@ impl Around {
         let h = period / f64::from(self.substeps);
         self.steps(motor, self.substeps, h, |motor, inverter| {
             averaged::step(terminals, motor, h, inverter.sign.kink)
+        });
+    }
+
+    /// Uses the averages of the period with a leg whose high or low side, or both, stay off. The diode of the other side
+    /// then carries the current that the dead side would carry. If neither direction of the current is consistent with
+    /// the leg's voltage, the phase carries no current.
+    #[cold]
+    fn with_dead_gates<M: MachineModel>(
+        &mut self,
+        motor: &mut MotorModel<M>,
+        compare: &Compare,
+        period: f64,
+        leg: usize,
+        off: [bool; 2],
+    ) {
+        let inverter = &self.inverter;
+        let source = |dead: bool, rail: f64| {
+            let mut acting = *compare;
+            if dead {
+                *[&mut acting.a, &mut acting.b, &mut acting.c][leg] = (rail * inverter.top) as u16;
+            }
+            RealSwitches(inverter.averaged(&acting, period))
+        };
+        // A current into the machine comes from the high side, a current back goes to the low side.
+        let ways = [(1.0, source(off[0], 0.0)), (-1.0, source(off[1], 1.0))];
+        let substeps = self.substeps.max(FREEWHEEL_SUBSTEPS);
+        let h = period / f64::from(substeps);
+        self.steps(motor, substeps, h, |motor, inverter| {
+            let before = motor.state;
+            for (sign, way) in ways {
+                let volt_seconds = averaged::step(&All(way), motor, h, inverter.sign.kink);
+                if sign * phases(motor.state.electrical.current())[leg] >= 0.0 {
+                    return volt_seconds;
+                }
+                motor.state = before;
+            }
+            averaged::step(&Without(leg, ways[0].1), motor, h, inverter.sign.kink)
         });
     }
 
