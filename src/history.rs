@@ -19,6 +19,8 @@
 
 #[cfg(target_os = "none")]
 mod hours;
+#[cfg(any(target_os = "none", test))]
+mod ripple;
 #[cfg(test)]
 mod tests;
 mod words;
@@ -82,6 +84,8 @@ pub struct History {
     pub starts: u32,
     /// Errors that the flash has corrected since the last reset.
     pub corrected: u32,
+    /// How often since the last reset the ripple of the dc link was too large.
+    pub ripples: u32,
     faults: Deque<PastFault, FAULTS>,
     page: usize,
     sequence: u32,

@@ -29,10 +29,8 @@ impl Shaft {
         let rpm = self.rpm(settings).abs();
         let encoder = settings.drive.angle_source == AngleSource::Encoder;
         match status.state {
-            State::Magnetising | State::Verifying | State::Torque | State::Speed => {
-                self.braked = false
-            }
-            State::Position | State::VoltsPerHertz => self.braked = false,
+            State::Magnetising | State::Verifying | State::Position => self.braked = false,
+            State::Torque | State::Speed | State::VoltsPerHertz => self.braked = false,
             State::Braking | State::BrakingByFrequency => self.braked = true,
             State::Stopping => {}
             State::Off | State::Fault(_) if encoder => {

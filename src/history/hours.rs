@@ -5,7 +5,10 @@ use drive_core::State;
 use stm32g4xx_hal::pac::FLASH;
 
 use super::History;
+use super::ripple::Ripple;
+use super::words::RIPPLE;
 use crate::chip::flash::Pages;
+use crate::chip::memory;
 use crate::chip::watchdog::{Guard, extended};
 use crate::store::FlashError;
 
@@ -30,17 +33,31 @@ pub struct Hours {
     was_off: bool,
     /// Whether the control goes on while the history is written; otherwise the history is not written.
     dual_bank: bool,
+    ripple: Ripple,
 }
 
 impl Hours {
     /// Continues the history in the flash.
     pub fn load(pages: &mut Pages, dual_bank: bool) -> Self {
-        Self { history: History::load(pages), counted_ms: 0, was_off: true, dual_bank }
+        let (history, ripple) = (History::load(pages), Ripple::default());
+        Self { history, counted_ms: 0, was_off: true, dual_bank, ripple }
     }
 
-    /// Counts up to this time, ms, and writes when that is due.
-    pub fn count(&mut self, now_ms: u32, off: bool, guard: &mut Guard, pages: &mut Pages) {
+    /// Counts up to this time, ms, and writes when that is due; `dc_link` is the address of the dc link's
+    /// voltage, none with the outputs off.
+    pub fn count(
+        &mut self,
+        now_ms: u32,
+        dc_link: Option<u32>,
+        guard: &mut Guard,
+        pages: &mut Pages,
+    ) {
+        let off = dc_link.is_none();
         self.history.corrected += u32::from(take_corrected());
+        if self.ripple.follow(now_ms, dc_link.map(|at| f32::from_bits(memory::word(at)))) {
+            self.history.ripples += 1;
+            defmt::warn!("{}", RIPPLE);
+        }
         self.history.pass(now_ms.wrapping_sub(self.counted_ms), !off);
         self.counted_ms = now_ms;
         if self.history.is_due(off) {

@@ -7,6 +7,10 @@ use drive_core::Fault;
 use super::{CHANGED, History};
 use crate::settings::keys::{self, Key};
 
+/// The warning about the ripple of the dc link.
+pub const RIPPLE: &str =
+    "ripple of the dc link above 15 %: aged capacitor, or a mains phase missing";
+
 /// Line number `i` of the history: the totals, then the faults, the latest first.
 pub fn line(history: &History, i: usize) -> Option<impl fmt::Display> {
     let fault = i.checked_sub(1).map(|i| history.faults().nth(i));
@@ -17,10 +21,11 @@ pub fn line(history: &History, i: usize) -> Option<impl fmt::Display> {
             let (powered, running) = (hours(history.powered_s), hours(history.running_s));
             let starts = history.starts;
             write!(f, "powered {powered:.1} h, with current {running:.1} h, starts {starts}")?;
-            return match history.corrected {
-                0 => Ok(()),
-                count => write!(f, "; errors of the flash corrected since the reset: {count}"),
-            };
+            let (corrected, ripples) = (history.corrected, history.ripples);
+            if corrected > 0 {
+                write!(f, "; errors of the flash corrected since the reset: {corrected}")?;
+            }
+            return if ripples > 0 { write!(f, "; {RIPPLE}: {ripples} times") } else { Ok(()) };
         };
         let (code, at) = (fault.code, hours(60 * fault.powered_min));
         if code == CHANGED {

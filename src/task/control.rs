@@ -4,7 +4,7 @@
 //! and must have written the compare values before the next update, one control period later. It never logs, formats, waits, or takes a
 //! lock.
 
-mod addresses;
+pub mod addresses;
 
 use core::cell::UnsafeCell;
 use core::mem::{MaybeUninit, offset_of};

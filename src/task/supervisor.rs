@@ -146,7 +146,8 @@ impl Supervisor {
         // The commissioning designs for seconds, and the console needs the time after that.
         self.clock.update();
         let now = self.clock.ms;
-        self.hours.count(now, self.is_off(), &mut self.guard, self.chip.saved.flash());
+        let dc_link = (!self.is_off()).then_some(control::addresses::DC_LINK as u32);
+        self.hours.count(now, dc_link, &mut self.guard, self.chip.saved.flash());
         self.link.iter_mut().for_each(|link| link.sources.watch(now));
         self.clock.ms
     }

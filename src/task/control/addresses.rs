@@ -6,7 +6,7 @@
 
 use core::mem::{offset_of, size_of};
 
-use drive_core::{Coefficients, Command, Drive};
+use drive_core::{Coefficients, Command, Drive, Telemetry};
 use induction_drive::link::mailbox::Mailbox;
 
 use super::{Control, RUNNING, Running};
@@ -49,6 +49,9 @@ const fn in_drive(offset: usize) -> *const u8 {
 const fn in_control(offset: usize) -> *const u8 {
     RUNNING.0.get().cast::<u8>().cast_const().wrapping_add(offset_of!(Running, control) + offset)
 }
+
+/// The voltage of the dc link at the last step with the outputs on, V, a floating-point number.
+pub const DC_LINK: *const u8 = in_drive(<Drive>::TELEMETRY + offset_of!(Telemetry, dc_link));
 
 // SAFETY: the only symbol of this name in the image.
 #[used]
