@@ -13,12 +13,14 @@
 //!   judged whenever one of them may change. Transients within a dead time are not modelled.
 //! * The motor is advanced between the tops of the PWM counter. If outputs go off between two of them, they take effect
 //!   at that time, with the mean voltage of the period until then. There is no model for a bridge of which only some
-//!   legs are driven: such a bridge counts as off at the motor, but not in the judgement at the gates.
+//!   legs are driven: such a bridge counts as off at the motor, but not in the judgement at the gates. (A gate that stays
+//!   off behind its driver is modelled by the plant.)
 //! * Shunts show the mean current of the period between two tops, and after a top its slope in the zero vector; the
 //!   ripple of the other vectors is not modelled.
 
 pub mod addresses;
 pub mod board;
+pub mod faults;
 pub mod image;
 pub mod interactive;
 pub mod log;

@@ -30,6 +30,7 @@ use scene::Scene;
 use stm32g4_unicorn::periph::Reset;
 use virtual_board::Image;
 use virtual_board::board::{Board, TICKS_PER_PERIOD};
+use virtual_board::faults::Script;
 use virtual_board::power_stage::{PowerStage, REFERENCE};
 
 /// One run in this number continues after its reset until the console greets.
@@ -163,24 +164,39 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> 
     let whole_start = rng.random_range(0..WHOLE_STARTS) == 0;
     match class.run {
         Run::Regulating => {
-            scene.regulating(source, turn)?;
+            match class.off {
+                true => scene.typed(&class.lines)?,
+                false => scene.regulating(source, turn)?,
+            }
             cut(&mut scene.board, &class.name, "");
             // First whole periods, because the true values are compared once in each, and then a part of one until the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
-            let what = class.inject(&mut scene.board, &scene.target, &mut rng)?;
+            let (board, target) = (&mut scene.board, &scene.target);
+            let (mut script, what) = match class.faults.is_empty() {
+                true => (Script::default(), class.inject(board, target, &mut rng)?),
+                false => Script::new(&class.faults, board, &target.places(), &mut rng)?,
+            };
             cut(&mut scene.board, &class.name, &what);
             let (promised, bound) = (class.bound.0.is_finite(), class.bound.0);
             let trip_a = scene.target.settings.trip_a().into();
             let ms = AFTER_MS + if promised { bound } else { 0.0 };
-            let mut outcome = judge::watch(&mut scene.board, trip_a, ms, promised)
-                .with_context(|| what.clone())?;
+            // In a start the flux has no angle yet.
+            let (angle, scripted) = (promised && !class.off, !class.faults.is_empty());
+            let ends_ms = (class.ends && scripted).then_some(bound);
+            let mut outcome =
+                judge::watch(&mut scene.board, &mut script, trip_a, ms, angle, ends_ms)
+                    .with_context(|| what.clone())?;
             ensure!(
-                !class.ends || outcome.off_ms.is_some_and(|ms| ms <= bound),
+                !class.ends || scripted || outcome.off_ms.is_some_and(|ms| ms <= bound),
                 "{what}: the outputs stay on"
             );
-            if outcome.off_ms.is_some() {
-                judge::reported(&mut scene.board, whole_start)
+            if outcome.off_ms.is_some() && !class.off {
+                judge::reported(&mut scene.board, whole_start, class.resets)
                     .with_context(|| format!("{what}; after the end"))?;
+            }
+            if let Some(told) = &class.told {
+                let shown = scene.board.take_log()?.join("\n") + &scene.board.take_console();
+                ensure!(shown.contains(told), "{what}: not told {told:?}, but {shown}");
             }
             outcome.what = what;
             Ok(outcome)

@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
+use hil_sim::plant::{DcLinkSettings, Load};
 use stm32g4_unicorn::periph::Reset;
 use virtual_board::Board;
 use virtual_board::board::Debugger;
@@ -68,6 +69,28 @@ fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
     assert!(highest < TRIP_V - 5.0, "{highest} V");
     // The estimate does not include magnetic energy and slip.
     assert!(most > 0.05 && (60.0..140.0).contains(&burnt), "{most}, {burnt} J");
+    Ok(())
+}
+
+/// A motor of 100 W at a rectifier whose capacitor is much too small. With six pulses the ripple stays below the limit of
+/// the warning; when a mains phase is lost, two pulses are left, and the log and the history tell it.
+#[test]
+fn a_lost_mains_phase_is_told() -> Result<()> {
+    let mut pair = braked(|_| {}, &[])?;
+    pair.board.plant.set_load(Load::Speed { speed: 300.0 * std::f64::consts::TAU / 60.0 })?;
+    pair.start_torque()?;
+    pair.order("torque 2")?;
+    for pulses in [6, 2] {
+        let link = DcLinkSettings { capacitor: 30e-6, pulses, ..DcLinkSettings::DEFAULT };
+        pair.board.plant.set_supply(&link)?;
+        pair.board.take_log()?;
+        pair.run(6000, |_, _| {})?;
+        assert_eq!(pair.shadow.drive.state(), State::Torque);
+        let told = pair.board.take_log()?.iter().any(|l| l.contains("ripple of the dc link"));
+        assert_eq!(told, pulses == 2, "{pulses} pulses");
+    }
+    let history = pair.ask("history")?;
+    assert!(format!("{history:?}").contains("mains phase missing: 1 times"), "{history:?}");
     Ok(())
 }
 

@@ -10,7 +10,7 @@ mod nets;
 pub mod pins;
 mod supply;
 
-pub use bus::{Unknown, clock_of};
+pub use bus::{Unknown, clock_of, kept_registers};
 pub use execution::Watched;
 
 use crate::circuit::{Circuit, SUPPLY_V};

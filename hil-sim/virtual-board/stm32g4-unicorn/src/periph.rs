@@ -77,6 +77,12 @@ static AT_RESET: LazyLock<BTreeMap<String, BTreeMap<String, Register>>> = LazyLo
     toml::from_str(include_str!("periph/registers.toml")).expect("the table of registers")
 });
 
+/// Returns the addresses of a peripheral's registers that keep their value, and their writable bits.
+pub(crate) fn kept(peripheral: &str, base: u32) -> impl Iterator<Item = (u32, u32)> {
+    let registers = AT_RESET[peripheral].values().filter(|register| register.2 != 0);
+    registers.map(move |register| (base + register.0, register.2))
+}
+
 /// Registers without behaviour.
 #[derive(Clone, Debug)]
 pub struct Store(Vec<Register>);

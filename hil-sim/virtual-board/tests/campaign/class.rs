@@ -6,15 +6,13 @@ use anyhow::{Result, bail};
 use rand::{Rng, RngExt};
 use serde::Deserialize;
 
-use super::faults::{
-    bad_code, current, flip, flip_register, losing, name, noise, set_clocks, slow_sensor,
-};
+use super::faults::{bad_code, flip_register, losing, name, noise, set_clocks, slow_sensor};
 use super::scene::{Source, Target};
-use super::strip::Fault;
-use hil_sim::plant::EncoderFault;
+use super::strip;
 use induction_drive::board as firmware_board;
 use stm32g4_unicorn::{chip::TICKS_PER_S, cpu::Register, memory::Region, periph::iwdg::LSI_HZ};
 use virtual_board::board::Board;
+use virtual_board::faults::{Fault, current, flip};
 
 /// The procedure of a run.
 #[derive(Clone, Copy, Default, Deserialize)]
@@ -30,7 +28,7 @@ pub enum Run {
     /// The reset pin is pulled, while the drive regulates or while it starts.
     Reset,
     /// Faults of wires at the terminal strip, with the drive off and while it turns.
-    Strip(Fault),
+    Strip(strip::Fault),
 }
 
 /// The contents of the file.
@@ -76,6 +74,23 @@ pub struct Class {
     /// Whether the outputs must be off after the bound even if the control is correct.
     #[serde(default)]
     pub ends: bool,
+    /// Whether it begins with the drive off instead of regulating, and lines that are typed before.
+    #[serde(default)]
+    pub off: bool,
+    #[serde(default)]
+    pub lines: Vec<String>,
+    /// Its faults, if they are not those of [`Class::inject`].
+    #[serde(default)]
+    pub faults: Vec<Fault>,
+    /// Text that log or console must show.
+    pub told: Option<String>,
+    /// Number of resets that it may cause.
+    #[serde(default = "one_reset")]
+    pub resets: usize,
+}
+
+fn one_reset() -> usize {
+    1
 }
 
 fn both() -> Vec<Source> {
@@ -118,13 +133,6 @@ impl Class {
                 board.disturb = Some(Box::new(move |s| *current(which, s) = value));
                 what = format!("{} at {value}", name(which));
             }
-            "current sensor open" => {
-                let which = target.any_current(rng);
-                let line = target.line(which);
-                let zero = (-line.offset / line.gain).round() as u16;
-                board.disturb = Some(Box::new(move |s| *current(which, s) = zero));
-                what = name(which).into();
-            }
             "current sensor saturated" => {
                 let (which, high) = (target.any_current(rng), rng.random::<bool>());
                 let code = if high { firmware_board::ADC_FULL_SCALE } else { 0 };
@@ -160,23 +168,9 @@ impl Class {
                 }
                 what = "no such word".into();
             }
-            "dc-link step" => {
-                // Values for a dc link of 311 V.
-                let volts = target.relative_voltage * rng.random_range(100.0..600.0);
-                board.plant.set_dc_link(volts).ok();
-                what = format!("to {volts:.0} V");
-            }
-            "encoder stands still" => board.plant.set_encoder_fault(EncoderFault::Stuck),
             "encoder loses counts of up to 6 rpm" => {
                 what = losing(board, rng.random_range(0.0..6.0) / target.encoder_rpm);
             }
-            "encoder loses 5 to 90 % of its counts at 900 rpm and more" => {
-                what = losing(board, rng.random_range(0.05..0.9));
-            }
-            "encoder loses 2 to 90 % of its counts at 300 rpm" => {
-                what = losing(board, rng.random_range(0.02..0.9));
-            }
-            "break pin" => board.set_fault_pin(false),
             "clock failure" => board.set_crystal(false),
             "flash ECC in code" => what = bad_code(board, rng),
             "bit flip in the coefficients" => what = flip(board, rng, addresses.coefficients),

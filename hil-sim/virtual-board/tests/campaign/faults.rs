@@ -2,7 +2,7 @@
 
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
-use induction_drive::monitor::register_check::{COUNT, Register, control};
+use induction_drive::monitor::register_check::control;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -12,18 +12,10 @@ use drive_core::{Line, Sample};
 use drive_settings::CurrentSensors;
 use stm32g4_unicorn::memory::{FLASH, Region, STORED};
 use virtual_board::board::Board;
+use virtual_board::faults::{Places, flip_one};
 
 /// Selects the ADC counts of a quantity in a sample.
 type Code = fn(&mut Sample) -> &mut u16;
-
-/// Returns the ADC counts of the current sensor of phase 0, 1 or 2.
-pub fn current(which: usize, sample: &mut Sample) -> &mut u16 {
-    match which {
-        0 => &mut sample.current_a,
-        1 => &mut sample.current_b,
-        _ => &mut sample.current_c,
-    }
-}
 
 /// Returns the name of a current sensor.
 pub fn name(which: usize) -> &'static str {
@@ -36,6 +28,19 @@ impl Target {
         match self.settings.scales.sensors {
             CurrentSensors::InLine => usize::from(!rng.random::<bool>()),
             CurrentSensors::LowSide => rng.random_range(0..3),
+        }
+    }
+
+    /// Returns what described faults act on.
+    pub fn places(&self) -> Places {
+        let addresses = self.addresses;
+        let word = |address| Region { address, size: 4 };
+        let mailbox = Region { address: addresses.orders, size: addresses.order_waits + 4 };
+        Places {
+            lines: [0, 1, 2].map(|which| self.line(which)),
+            sensors: if self.settings.scales.sensors == CurrentSensors::InLine { 2 } else { 3 },
+            relative_voltage: self.relative_voltage,
+            areas: vec![addresses.state, self.data, word(addresses.phase), mailbox],
         }
     }
 
@@ -87,34 +92,10 @@ pub fn slow_sensor(board: &mut Board, rng: &mut dyn Rng, of: Code) -> String {
     [format!("stuck at {held}"), "open".into(), "saturated".into(), noisy][kind].clone()
 }
 
-/// Bits that affect the gates at once, before any software. TIM1: clock of the dead time (CR1), polarity (CCER). Ports:
-/// the functions of PA7 to PA10, PB0 and PB1; the levels of other functions are not modelled.
-const AT_THE_GATES: [(u32, u32); 5] = [
-    (0x4001_2c00, 3 << 8),
-    (0x4001_2c20, 0xaaa),
-    (0x4800_0020, 0xf << 28),
-    (0x4800_0024, 0xfff),
-    (0x4800_0420, 0xff),
-];
-
 /// Flips a writable bit of a register that the firmware checks.
 pub fn flip_register(board: &mut Board, rng: &mut dyn Rng) -> String {
-    loop {
-        let Register { address, mask } = control().nth(rng.random_range(0..COUNT)).unwrap();
-        let bit = rng.random_range(0..32);
-        if mask >> bit & 1 == 0
-            || AT_THE_GATES.iter().any(|g| g.0 == address && g.1 >> bit & 1 == 1)
-        {
-            continue;
-        }
-        let chip = board.chip();
-        let before = chip.read(address, 4);
-        chip.write(address, 4, before ^ 1 << bit);
-        // The bit is neither reserved nor locked.
-        if (chip.read(address, 4) ^ before) & mask != 0 {
-            return format!("bit {bit} of {address:#010x}");
-        }
-    }
+    let registers: Vec<_> = control().map(|register| (register.address, register.mask)).collect();
+    flip_one(board, rng, &registers)
 }
 
 /// Makes the check code wrong of the next instructions of the main loop in the flash, or of some instructions after them.
@@ -126,14 +107,4 @@ pub fn bad_code(board: &mut Board, rng: &mut dyn Rng) -> String {
     let address = board.chip().at & !7;
     board.chip().flash.bad_code = Some(address);
     format!("{address:#010x}")
-}
-
-/// Flips a bit of a region.
-pub fn flip(board: &mut Board, rng: &mut dyn Rng, region: Region) -> String {
-    let offset = rng.random_range(0..region.size);
-    let address = region.address + offset;
-    let bit = rng.random_range(0..8);
-    let byte = board.cpu.byte(address).unwrap_or(0) ^ 1 << bit;
-    board.cpu.write(address, &[byte]);
-    format!("bit {bit} of {address:#010x}, {offset:#x} from the beginning")
 }

@@ -6,11 +6,11 @@ use anyhow::{Result, bail, ensure};
 
 use stm32g4_unicorn::{chip::TICKS_PER_S, periph::Reset};
 use virtual_board::board::{Board, TICKS_PER_PERIOD};
+use virtual_board::faults::Script;
 
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;
-/// Number of resets that counts as a loop: the fault itself may cause the first reset.
-const MOST_RESETS: usize = 2;
+const PERIOD_MS: f64 = 1.0 / 6.0;
 /// Number of periods from a reset until the log has reported it.
 const REPORTED: u64 = 400;
 /// Number of periods from the switch-off of the outputs until the log has reported it.
@@ -33,36 +33,52 @@ pub struct Outcome {
     pub angle_deg: f64,
 }
 
-/// Watches for `ms` after the fault, or until the outputs are off. It judges the currents, up to `trip_a`, and, if
-/// `angle_counts`, the angle as well.
+/// Watches for `ms` after the end of the script, or until the outputs are off. It judges the currents, up to `trip_a`,
+/// and, if `angle_counts`, the angle as well. With `ends_ms`, no gate may be on later than that after the last fault.
 ///
 /// # Errors
 /// Wrong gate signals, or another failure of the model.
-pub fn watch(board: &mut Board, trip_a: f64, ms: f64, angle_counts: bool) -> Result<Outcome> {
-    let began = board.chip().now;
+pub fn watch(
+    board: &mut Board,
+    script: &mut Script,
+    trip_a: f64,
+    ms: f64,
+    angle_counts: bool,
+    ends_ms: Option<f64>,
+) -> Result<Outcome> {
+    let now = board.chip().now;
+    let (began, until) = (script.began.max(now), script.ends.max(now));
     let mut outcome = Outcome::default();
     board.went_off = None;
-    let since = |at: u64| at.saturating_sub(began) as f64 * 1e3 / TICKS_PER_S as f64;
-    let mut next = began;
-    while since(next) < ms {
+    let since = |from: u64, at: u64| at.saturating_sub(from) as f64 * 1e3 / TICKS_PER_S as f64;
+    let (mut next, mut right) = (now, now);
+    while since(until, next) < ms {
         // The true angle of the motor and the drive's angle belong to the same sample.
         next += TICKS_PER_PERIOD;
-        let now = board.chip().now;
-        board.run_ticks(next.saturating_sub(now))?;
+        script.run_until(board, next)?;
         while board.next_period().is_some() {}
         let current =
             board.plant.phase_currents().into_iter().fold(0.0, |m: f64, i| m.max(i.abs()));
         outcome.peak_a = outcome.peak_a.max(current);
-        if let Some(at) = board.went_off {
-            outcome.off_ms = Some(since(at));
-            break;
+        if let Some(at) = board.went_off.take() {
+            outcome.off_ms = Some(since(began, at));
+            if ends_ms.is_none() {
+                break;
+            }
         }
-        let error = angle_error(board);
+        if let Some(bound) = ends_ms.filter(|bound| since(began, next) > bound + PERIOD_MS) {
+            ensure!(!board.gates().any_on(), "a gate is on later than {bound} ms");
+        }
+        let error = if board.chip().tim1.outputs_on() { angle_error(board) } else { 0.0 };
         outcome.angle_deg = outcome.angle_deg.max(error);
         // A value that is not a number counts as wrong.
         let straight = error <= ANGLE_DEG || !angle_counts;
-        if !(straight && current < trip_a) {
-            outcome.wrong_ms = since(next);
+        if straight && current < trip_a {
+            right = next;
+        } else {
+            // A fault that comes and goes: from when on the control was wrong without a break.
+            outcome.wrong_ms =
+                outcome.wrong_ms.max(since(if script.repeats { right } else { began }, next));
         }
     }
     Ok(outcome)
@@ -85,11 +101,11 @@ fn angle_error(board: &Board) -> f64 {
     error.min(1.0 - error) * 360.0
 }
 
-/// Checks, after the outputs have gone off, that the reason is in the log, and that there is no loop of resets.
+/// Checks, after the outputs have gone off, that the reason is in the log, and that there are no more resets than these.
 ///
 /// # Errors
 /// No reason in the log, or a loop of resets.
-pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
+pub fn reported(board: &mut Board, whole_start: bool, resets: usize) -> Result<()> {
     board.run_periods(FAULT_REPORTED)?;
     if board.resets.is_empty() {
         let log = board.take_log()?;
@@ -112,7 +128,7 @@ pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
     if whole_start {
         greeting(board)?;
     }
-    ensure!(board.resets.len() < MOST_RESETS, "reset again and again: {:?}", board.resets);
+    ensure!(board.resets.len() <= resets, "reset again and again: {:?}", board.resets);
     Ok(())
 }
 

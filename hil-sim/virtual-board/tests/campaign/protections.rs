@@ -16,11 +16,12 @@ const ECCL: u32 = 1 << 3;
 const WWDG_CFR: u32 = 0x4000_2c04;
 
 /// The classes, each with its protection.
-const PROTECTED: [(&str, Protection); 7] = [
+const PROTECTED: [(&str, Protection); 8] = [
     ("TIM1 stops", Protection::Window),
     ("core hangs", Protection::Window),
     ("LSI off its frequency", Protection::Sources),
     ("crystal off its frequency", Protection::Sources),
+    ("crystal drifts to 4 to 10 % fast", Protection::Sources),
     ("reference voltage off", Protection::Sources),
     ("bit flip in a register", Protection::Registers),
     ("flash ECC in code", Protection::Flash),

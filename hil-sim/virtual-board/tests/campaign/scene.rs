@@ -1,5 +1,6 @@
 //! The initial state of every injection: snapshots of a board that has started.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use anyhow::{Result, bail, ensure};
@@ -15,6 +16,7 @@ use virtual_board::addresses::Addresses;
 use virtual_board::board::{Chip, snapshot::Snapshot};
 use virtual_board::{Board, Image, Options, PowerStage};
 
+use super::judge::wait;
 use crate::common::pair::Pair;
 
 /// q-axis current before the injection of a fault, A on the dissertation's motor. At speed its sign also makes the motor generate.
@@ -102,6 +104,8 @@ pub struct Scene {
     off: [Snapshot; 2],
     /// Snapshots with the drive off, and turning for the terminal strip, after the first fault of its wires has made them.
     pub strip: Option<[Snapshot; 2]>,
+    /// Snapshots after lines that were typed with the drive off.
+    typed: BTreeMap<Vec<String>, Snapshot>,
     /// Snapshots with each torque: without the encoder, and with it at each speed.
     sensorless: Vec<Snapshot>,
     encoder: Vec<Vec<Snapshot>>,
@@ -160,7 +164,16 @@ impl Scene {
         let settings = pair.shadow.settings();
         let board = pair.board;
         let target = Target::new(&board, &config, settings, speeds[0])?;
-        Ok(Self { board, target, settings: [old, new], off, strip: None, sensorless, encoder })
+        Ok(Self {
+            board,
+            target,
+            settings: [old, new],
+            off,
+            strip: None,
+            typed: BTreeMap::new(),
+            sensorless,
+            encoder,
+        })
     }
 
     /// Goes to a snapshot in which the drive regulates torque; at speed, every second pair of turns has a generating torque.
@@ -183,6 +196,24 @@ impl Scene {
     /// An error of the emulator.
     pub fn off(&mut self, slot: usize) -> Result<()> {
         self.board.go_back(&self.off[slot % 2])
+    }
+
+    /// Goes to the drive off after these lines, each with time to take effect; makes the snapshot at the first call.
+    ///
+    /// # Errors
+    /// An error of the emulator.
+    pub fn typed(&mut self, lines: &[String]) -> Result<()> {
+        self.off(0)?;
+        if !self.typed.contains_key(lines) {
+            for line in lines {
+                self.board.type_line(line);
+                wait(&mut self.board, DECAYED)?;
+                let said = self.board.take_console();
+                ensure!(!said.contains("error"), "{line}: {said}");
+            }
+            self.typed.insert(lines.to_vec(), self.board.keep()?);
+        }
+        self.board.go_back(&self.typed[lines])
     }
 }
 

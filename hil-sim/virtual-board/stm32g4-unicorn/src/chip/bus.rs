@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::{Chip, Circuit, OWN_REFERENCE_CODE, pins};
 use crate::memory;
 use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, On};
-use crate::periph::{Effect, Reset, gpio::IDR, uart};
+use crate::periph::{Effect, Reset, gpio::IDR, kept, uart};
 
 /// The peripherals whose clock can be off, one per row: name, first address, enable register and bit. The names become constants.
 macro_rules! clocked {
@@ -60,6 +60,33 @@ const BDTR: u32 = TIM1 + 0x44;
 /// Compare values of the first three channels.
 const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
 const TIM1_SR: u32 = 0x10;
+
+/// Returns the addresses of all registers whose value the model keeps, with their writable bits.
+pub fn kept_registers() -> impl Iterator<Item = (u32, u32)> {
+    const PORTS: &[u32] = &[GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG];
+    let adcs = &[ADC12, ADC12 + 0x100, ADC345, ADC345 + 0x100];
+    [
+        ("RCC", &[RCC] as &[u32]),
+        ("PWR", &[PWR]),
+        ("FLASH", &[FLASH]),
+        ("SYSCFG", &[SYSCFG]),
+        ("EXTI", &[EXTI]),
+        ("SCS", &[0]),
+        ("GPIO", PORTS),
+        ("TIM1", &[TIM1]),
+        ("TIM2", &[TIM2]),
+        ("TIM5", &[TIM5]),
+        ("TIM16", &[TIM16]),
+        ("TIM8", &[TIM8]),
+        ("ADC", adcs),
+        ("DAC", &[DAC1, DAC3]),
+        ("LPUART1", &[LPUART1]),
+        ("USART3", &[USART3]),
+        ("WWDG", &[WWDG]),
+    ]
+    .into_iter()
+    .flat_map(|(name, bases)| bases.iter().flat_map(move |base| kept(name, *base)))
+}
 
 /// An access that the model does not know.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
