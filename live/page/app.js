@@ -72,6 +72,7 @@ function greet(now) {
   alarm('fit', now.misfit ? [now.misfit] : []);
   alarm('gone', []);
   if (fresh) signalsChoice();
+  if (fresh && now.motors) motorsChoice(now);
   if (now.signals.length) restream();
   loadSettings();
   if (fresh && !token && query.has('play')) play(`~learning; ~off; ${query.get('play')}`);

@@ -277,12 +277,20 @@ async function play(lines) {
     }
   } catch { /* told already */ }
 }
+/** The motors of the page. Another one needs another drive, so the page opens anew. The guide has currents and speeds of the first one. */
+function motorsChoice({ motors, dc_link_v }) {
+  $('motor').replaceChildren(...motors.map(([value, title]) => make('option', { value, textContent: `${title} (${value})`, defaultSelected: value === (query.get('motor') || motors[0][0]) })));
+  $('motor').onchange = () => { location.search = new URLSearchParams({ seed: query.get('seed') || 1, motor: $('motor').value }); };
+  $('motor').parentElement.hidden = false;
+  $('guide').hidden = $('motor').selectedIndex > 0;
+  document.querySelector('[data-line="!dc"]').defaultValue = dc_link_v;
+}
 /** An address that brings the drive of a page into the present state: with its seed, the lines that have changed the motor, and the set-point. */
 function address() {
   const mode = regulated(), word = mode === 'vf' ? 'speed' : mode;
   // A load acts on a drive that regulates: it would turn the shaft of one that is off.
   const lines = [...(mode ? [`start ${mode}`, mode === 'vf' ? '~turning' : '~regulating'] : []), ...altered.values(), ...(mode ? [`${word} ${asked[word] || 0}`] : [])];
-  const state = new URLSearchParams({ seed: query.get('seed') || 1, ...(lines.length ? { play: lines.join('; ') } : {}) });
+  const state = new URLSearchParams({ seed: query.get('seed') || 1, motor: $('motor').value, ...(lines.length ? { play: lines.join('; ') } : {}) });
   return `${location.origin}${location.pathname}?${state}`;
 }
 $('share').onclick = () => {

@@ -6,6 +6,7 @@ use std::sync::mpsc::{Sender, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
 use drive_web::board::HostBoard;
+use drive_web::motors::Motor;
 use hil_sim::console::link::Link;
 
 use crate::shared::Shared;
@@ -33,7 +34,7 @@ impl Write for ToBoard {
 /// # Errors
 /// The reason why the board does not start.
 pub fn connect(shared: &Arc<Shared>, seed: u64) -> Result<Link, String> {
-    let mut board = HostBoard::new(seed)?;
+    let mut board = HostBoard::new(&Motor::named("dissertation")?, seed)?;
     board.learn()?;
     let (reader, mut writer) = io::pipe().map_err(|why| why.to_string())?;
     let (send, lines) = channel::<Vec<u8>>();

@@ -158,14 +158,14 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     // As fast as the browser can, with the same bits as the same steps give here.
     page.value(&format!(
         "fetch('drive.wasm').then(file => file.arrayBuffer()).then(bytes => WebAssembly.instantiate(bytes, {{}})).then(({{ instance: {{ exports: own }} }}) => {{
-            own.init(7); let least = 1e9;
+            const name = new TextEncoder().encode('dissertation'); const place = own.line(name.length); new Uint8Array(own.memory.buffer, place, name.length).set(name); own.init(7); let least = 1e9;
             for (let passed = 0; passed < {MEASURED_MS}; passed += {PART_MS}) {{
                 const began = performance.now(); own.advance({PART_MS}); if (passed > {ON_MS}) least = Math.min(least, performance.now() - began); }}
             globalThis.measured = [{PART_MS} / least, BigInt.asUintN(64, own.fingerprint()).toString()]; }}); 0"
     ));
     page.until("!!globalThis.measured", PATIENCE);
     let faster = page.number("measured[0]");
-    let mut here = Talk::learning(7).unwrap();
+    let mut here = Talk::learning("dissertation", 7).unwrap();
     here.advance(MEASURED_MS);
     let fingerprint = here.board.machine.fingerprint.to_string();
     assert_eq!(page.value("measured[1]"), fingerprint.as_str());
@@ -173,7 +173,11 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     assert!(first < longest, "{first} ms, {longest} here");
     assert!(faster > FASTER, "{faster}");
 
-    // The address of a state gives it to another page.
+    // The address of a state gives it to another page: seed, motor, load, mode and set-point.
+    page.close();
+    let mut page = browser.open(&format!("{address}?seed=3&motor=kart-5kw3"));
+    page.until("/[*] learned: slope/.test($('log').textContent)", PATIENCE);
+    state(&mut page, "off");
     page.value(
         "play('~off; !load free 0.4; start speed; ~regulating; speed 120').then(() => 0); 0",
     );
@@ -183,8 +187,14 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     let mut other = browser.open(&shared);
     number(&mut other, "speed", "> 110");
     state(&mut other, "regulating speed");
-    let shown = "[$('reference').value, $('around').querySelector('input').value, $('links').textContent].join()";
-    assert_eq!(other.value(shown), "120,0.4, · project · manual · licence (not public yet)");
+    let shown = "[location.search.slice(0, 23), $('motor').value, document.querySelector('[data-line=\"!dc\"]').value, !!$('guide').offsetParent,
+        $('reference').value, $('around').querySelector('input').value, $('links').textContent].join()";
+    let wanted = "?seed=3&motor=kart-5kw3,kart-5kw3,36,false,120,0.4, · project · manual · licence (not public yet)";
+    assert_eq!(other.value(shown), wanted);
+    other.close();
+    let mut refused = browser.open(&format!("{address}?motor=kart"));
+    let why = "motor kart: this page cannot show it; it has dissertation, buildings-4kw";
+    refused.until(&format!("$('alarm').textContent.includes('{why}')"), PATIENCE);
 }
 
 /// The same board with `cargo live --simulated`, in real time.

@@ -4,13 +4,13 @@ use std::f64::consts::TAU;
 
 use induction_drive::boards::{ANALOG, CONTACTS, TERMINALS};
 use induction_drive::terminals::Contacts;
-use motor_plant::{Channel, CurrentFault, Load, MachineSettings, Plant, SaliencySettings};
+use motor_plant::{Channel, CurrentFault, Load, Plant, PlantSettings, SaliencySettings};
 
 /// The allowed words.
 const WORDS: &str = "load locked, load free NM, load speed RPM, turn DEG, open a|b|c|none, saliency \
                      SHARE, warm PERCENT, sensor a|b none|open|high|low, dc VOLT, strip CONTACT ...";
 
-/// Changes the plant as requested by these words.
+/// Changes the plant, which began with the settings `healthy`, as requested by these words.
 ///
 /// | words | effect |
 /// |---|---|
@@ -24,7 +24,7 @@ const WORDS: &str = "load locked, load free NM, load speed RPM, turn DEG, open a
 ///
 /// # Errors
 /// The error, and the allowed words.
-pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
+pub fn change(plant: &mut Plant, healthy: &PlantSettings, words: &str) -> Result<(), String> {
     let words: Vec<&str> = words.split_whitespace().collect();
     let number = |word: &str| {
         let value = word.parse().ok().filter(|value: &f64| value.is_finite());
@@ -43,12 +43,12 @@ pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
             plant.set_open_phase(named(phase, &phases)?)
         }
         ["saliency", share] => {
-            let (share, own) = (number(share)?, SaliencySettings::DEFAULT);
+            let (share, own) = (number(share)?, healthy.saliency);
             let s = SaliencySettings { a_psi: share * own.a_psi, b1: share * own.b1, ..own };
-            plant.set_saliency(&MachineSettings::DEFAULT, &s)
+            plant.set_saliency(&healthy.machine, &s)
         }
         ["warm", percent] => {
-            let (own, factor) = (MachineSettings::DEFAULT, 1.0 + number(percent)? / 100.0);
+            let (own, factor) = (healthy.machine, 1.0 + number(percent)? / 100.0);
             plant.set_resistances(own.rs * factor, own.rr * factor)
         }
         ["sensor", channel, fault] => {

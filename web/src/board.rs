@@ -16,6 +16,7 @@ use motor_plant::{
 
 use crate::around;
 use crate::machine::Machine;
+use crate::motors::Motor;
 
 /// Control periods from one pass of the main loop to the next. The next constant is the number of passes per millisecond.
 const PERIODS: u32 = 3;
@@ -31,6 +32,8 @@ pub struct HostBoard {
     front: Front,
     /// Drive and motor.
     pub machine: Machine,
+    /// Motor and sensors as they were at power-up.
+    pub healthy: PlantSettings,
     wires: Wires,
     contacts: Contacts,
     /// The line that is being received.
@@ -76,11 +79,11 @@ enum NoBus {}
 
 impl modbus::Port for NoBus {}
 
-/// The plant that `cargo sim` simulates by default, with the ADCs and the timer of the reference board, as on the virtual board.
-pub fn plant_settings(settings: &FirmwareSettings) -> PlantSettings {
+/// The plant that `cargo sim` simulates with this motor, with the ADCs and the timer of the reference board, as on the virtual board.
+pub fn plant_settings(motor: &Motor, settings: &FirmwareSettings) -> PlantSettings {
     let (scales, own) = (&settings.drive.scales, MeasurementSettings::DEFAULT);
     let dead_time_s = board::dead_time(settings.drive.inverter.dead_time_s).1;
-    PlantSettings {
+    let mut plant = PlantSettings {
         mechanics: MechanicsSettings { load: Load::Locked, ..MechanicsSettings::DEFAULT },
         inverter: InverterSettings {
             timer_top: board::PWM_TOP,
@@ -94,12 +97,15 @@ pub fn plant_settings(settings: &FirmwareSettings) -> PlantSettings {
             ..own
         },
         ..PlantSettings::DEFAULT
-    }
+    };
+    motor.suit(&mut plant);
+    plant
 }
 
-/// The settings of the reference board, whose bench steps were done.
-pub fn settings() -> FirmwareSettings {
+/// The settings of the reference board for a motor. The bench steps were done.
+pub fn settings(motor: &Motor) -> FirmwareSettings {
     let mut settings = FirmwareSettings::of_the_board();
+    motor.set(&mut settings.drive);
     settings.confirm_board();
     settings
 }
@@ -109,16 +115,22 @@ impl HostBoard {
     ///
     /// # Errors
     /// The reason why the plant or the drive refuses its settings.
-    pub fn new(seed: u64) -> Result<Self, String> {
-        let settings = settings();
-        let plant = Plant::new(&plant_settings(&settings), seed).map_err(|why| why.to_string())?;
-        Self::on(plant, &settings).map_err(|why| why.to_string())
+    pub fn new(motor: &Motor, seed: u64) -> Result<Self, String> {
+        let settings = settings(motor);
+        let healthy = plant_settings(motor, &settings);
+        let plant = Plant::new(&healthy, seed).map_err(|why| why.to_string())?;
+        Self::on(plant, healthy, &settings).map_err(|why| why.to_string())
     }
 
-    fn on(plant: Plant, settings: &FirmwareSettings) -> Result<Self, SettingsError> {
+    fn on(
+        plant: Plant,
+        healthy: PlantSettings,
+        settings: &FirmwareSettings,
+    ) -> Result<Self, SettingsError> {
         let (front, machine) = (Front::new(*settings), Machine::new(plant, settings)?);
         let (wires, contacts) = (Wires::default(), Contacts::default());
-        let mut board = Self { front, machine, wires, contacts, line: Vec::new(), now_ms: 0 };
+        let mut board =
+            Self { front, machine, healthy, wires, contacts, line: Vec::new(), now_ms: 0 };
         board.front.console.greet(&board.machine);
         Ok(board)
     }
@@ -155,7 +167,7 @@ impl HostBoard {
                     Some(words) => {
                         let done = match words.strip_prefix("strip") {
                             Some(names) => around::contacts(names).map(|c| self.contacts.0 = c),
-                            None => around::change(&mut self.machine.plant, words),
+                            None => around::change(&mut self.machine.plant, &self.healthy, words),
                         };
                         let answer =
                             done.map_or_else(|why| format!("error: {why}"), |()| "ok".into());
@@ -185,7 +197,7 @@ impl HostBoard {
             let (mut plant, saved) = (self.machine.plant.clone(), self.machine.saved);
             plant.set_pulses(saved.drive.inverter.switching_khz.pulses());
             // The saved settings were in force, so a board can be built with them.
-            if let Ok(board) = Self::on(plant, &saved) {
+            if let Ok(board) = Self::on(plant, self.healthy, &saved) {
                 *self = Self { contacts: self.contacts, ..board };
             }
         }

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use crate::board::HostBoard;
 use crate::loops;
+use crate::motors::Motor;
 
 /// Time from one question about the drive's state to the next, ms.
 const STATUS_MS: u32 = 200;
@@ -114,12 +115,12 @@ impl Talk {
         }
     }
 
-    /// A conversation with a board that begins to learn its motor. Equal seeds give equal bits.
+    /// A conversation with a board that begins to learn the motor of this name. Equal seeds give equal bits.
     ///
     /// # Errors
-    /// As [`HostBoard::new`].
-    pub fn learning(seed: u64) -> Result<Self, String> {
-        let mut talk = Self::new(HostBoard::new(seed)?);
+    /// As [`Motor::named`] and [`HostBoard::new`].
+    pub fn learning(motor: &str, seed: u64) -> Result<Self, String> {
+        let mut talk = Self::new(HostBoard::new(&Motor::named(motor)?, seed)?);
         talk.ask(0, "learn");
         talk.begins = true;
         Ok(talk)
@@ -194,7 +195,11 @@ impl Talk {
             By::Status => self.texts.push(json!({ "status": lines.last() })),
             By::Hello => {
                 let version = fmt::from_fn(|f| self.board.machine.version(f)).to_string();
-                self.texts.push(hello(Some(&version), &objects(&lines), None));
+                let mut said = hello(Some(&version), &objects(&lines), None);
+                let motors: Vec<_> = Motor::all().map(|motor| [motor.name, motor.title]).collect();
+                said["hello"]["motors"] = json!(motors);
+                said["hello"]["dc_link_v"] = self.board.healthy.inverter.vdc.into();
+                self.texts.push(said);
             }
         }
     }

@@ -2,6 +2,8 @@
 
 use std::cell::RefCell;
 
+use serde_json::json;
+
 use crate::talk::Talk;
 
 /// The conversation; a line from the page, or texts; and frames for the page.
@@ -15,10 +17,16 @@ fn with<R: Default>(act: impl FnOnce(&mut Talk) -> R) -> R {
     KEPT.with_borrow_mut(|(talk, ..)| talk.as_mut().map(act).unwrap_or_default())
 }
 
-/// Powers a board up, which learns its motor. Its settings are constants, and tests build the same board from them.
+/// Powers a board up, which learns the motor whose name was written as a line. Returns whether it did; if not, a message says why.
 #[unsafe(no_mangle)]
-extern "C" fn init(seed: u32) {
-    KEPT.with_borrow_mut(|kept| kept.0 = Talk::learning(seed.into()).ok());
+extern "C" fn init(seed: u32) -> bool {
+    KEPT.with_borrow_mut(|(talk, text, _)| {
+        match Talk::learning(&String::from_utf8_lossy(text), seed.into()) {
+            Ok(begun) => *talk = Some(begun),
+            Err(why) => *text = json!([{ "gone": why }]).to_string().into_bytes(),
+        }
+        talk.is_some()
+    })
 }
 
 /// Returns the place for a line of this number of bytes.

@@ -1,7 +1,9 @@
 //! The board without hardware answers as the firmware does, learns, holds torque at rest, and computes the same bits as the simulator.
 
 use drive_core::{Command, Drive, Mode};
+use drive_settings::SETTINGS;
 use drive_web::board::{HostBoard, plant_settings, settings};
+use drive_web::motors::Motor;
 use drive_web::talk::Talk;
 use motor_plant::Plant;
 use serde_json::Value;
@@ -20,7 +22,7 @@ struct Session {
 
 impl Session {
     fn new(seed: u64) -> Self {
-        let talk = Talk::new(HostBoard::new(seed).unwrap());
+        let talk = Talk::new(HostBoard::new(&Motor::all().next().unwrap(), seed).unwrap());
         Self { talk, number: 0, said: Vec::new(), frames: Vec::new() }
     }
 
@@ -71,19 +73,98 @@ impl Session {
     }
 }
 
+/// The lines of `motors.txt` for a motor, from its own file.
+fn lines_of(name: &str) -> String {
+    let config = Config::of_motor(Some(name)).unwrap();
+    let plant = sim_bench::config::plant_settings(&config);
+    let (m, s, shaft) = (plant.machine, plant.saliency, plant.mechanics);
+    let (inverter, sensors) = (plant.inverter, plant.measurement);
+    let numbers = [
+        m.rs,
+        m.rr,
+        m.lls,
+        m.llr,
+        m.lm,
+        m.pole_pairs.into(),
+        s.b1,
+        s.hold_a,
+        s.psi_n.unwrap(),
+        shaft.inertia,
+        shaft.friction,
+        inverter.vdc,
+        inverter.residual_v,
+        sensors.range_a,
+        sensors.noise_a,
+        sensors.dc_link_v,
+    ];
+    let title = sim_bench::config::motors::Motor::find(name).unwrap().title;
+    let mut lines = vec![format!("{name}: {title}"), numbers.map(|n| n.to_string()).join(" ")];
+    let board = induction_drive::settings::FirmwareSettings::of_the_board().drive;
+    let (mut wanted, default) = (config.drive, Config::default().drive);
+    // The ADCs of the board have another reference.
+    let ratio = board.scales.current_a.gain / default.scales.current_a.gain;
+    for line in [&mut wanted.scales.current_a, &mut wanted.scales.current_b] {
+        line.gain *= ratio;
+    }
+    let differing = SETTINGS.iter().filter(|entry| entry.get(&config.drive) != entry.get(&default));
+    lines.extend(differing.map(|entry| format!("{} {}", entry.name, entry.get(&wanted))));
+    lines.join("\n")
+}
+
+#[test]
+fn the_file_of_the_motors_has_what_their_own_files_say() {
+    let mut all: Vec<String> =
+        sim_bench::config::motors::Motor::all().into_iter().map(|motor| motor.name).collect();
+    // The inverter of this motor has a shorter dead time than the board allows.
+    all.retain(|name| name != "spindle-2kw2");
+    // The first is the motor of the drive's default settings.
+    all.sort_by_key(|name| name != "dissertation");
+    let text = all.iter().map(|name| lines_of(name)).collect::<Vec<_>>().join("\n\n");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/motors.txt");
+    if std::env::var_os("WRITE_DOCS").is_some() {
+        std::fs::write(path, &text).unwrap();
+    }
+    assert_eq!(std::fs::read_to_string(path).unwrap(), text, "WRITE_DOCS=1 writes it");
+    for motor in Motor::all() {
+        let config = Config::of_motor(Some(motor.name)).unwrap();
+        let plant = plant_settings(&motor, &settings(&motor));
+        let mut theirs = sim_bench::config::plant_settings(&config);
+        // The ADCs and the timer are those of the board.
+        (theirs.inverter, theirs.measurement) = (plant.inverter, plant.measurement);
+        theirs.dc_link = plant.dc_link;
+        assert_eq!(plant, theirs, "{}", motor.name);
+    }
+}
+
+#[test]
+fn a_drive_of_another_size_learns_its_motor_and_holds_torque_at_rest() {
+    assert!(Motor::named("kart").err().unwrap().contains("kart-5kw3, krause-3hp"));
+    for (name, iq_a) in [("kart-5kw3", 160.0), ("modelica-18kw5", 28.0)] {
+        let motor = Motor::named(name).unwrap();
+        let mut board = HostBoard::new(&motor, 1).unwrap();
+        board.learn().unwrap();
+        board.write(b"start torque\n");
+        (0..4000).for_each(|_| board.millisecond());
+        board.write(format!("torque {iq_a}\n").as_bytes());
+        (0..2000).for_each(|_| board.millisecond());
+        let [drive, own, psi] = board.machine.flux();
+        let apart_deg = ((drive - own + 1.5) % 1.0 - 0.5) * 360.0;
+        let nm = board.machine.plant.torque_factor() * psi * iq_a;
+        let torque = board.machine.plant.torque();
+        assert!(
+            apart_deg.abs() < 5.0 && (torque / nm - 1.0).abs() < 0.2,
+            "{name}: {apart_deg} degrees, {torque} of {nm} Nm"
+        );
+    }
+}
+
 /// The plant equals the simulator's, which has the same drive: the same seed gives the same bits.
 #[test]
 fn the_same_seed_gives_the_bits_of_the_simulator() {
-    let settings = settings();
-    let plant = plant_settings(&settings);
-    let mut theirs = sim_bench::config::plant_settings(&Config::default());
-    (theirs.inverter, theirs.measurement) = (plant.inverter, plant.measurement);
-    // There is no sag of the dc link, so its depth does not matter.
-    theirs.dc_link = plant.dc_link;
-    // The flux of a d-axis current of 0.7 A, which is also the value if none is set.
-    assert_eq!(theirs.saliency.psi_n.take(), Some(0.7 * plant.machine.lm));
-    assert_eq!(plant, theirs);
-    let mut board = HostBoard::new(7).unwrap();
+    let motor = Motor::all().next().unwrap();
+    let settings = settings(&motor);
+    let plant = plant_settings(&motor, &settings);
+    let mut board = HostBoard::new(&motor, 7).unwrap();
     let drive = Drive::new(settings.build().unwrap());
     let mut rig = Rig::of(Plant::new(&plant, 7).unwrap(), drive);
     let start = Command::Start(Mode::Learning);
