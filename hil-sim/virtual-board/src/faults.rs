@@ -24,7 +24,7 @@ const OHM: f64 = 200.0;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
-    /// What is disturbed, see [`effect`]; behind a colon what the effect needs.
+    /// The place that is disturbed, see [`effect`]; behind a colon the value that the effect needs.
     at: String,
     /// Its size.
     #[serde(default = "whole")]
@@ -51,7 +51,7 @@ fn once() -> u32 {
     1
 }
 
-/// What the faults act on.
+/// The parts of board and motor that the faults act on.
 #[derive(Clone, Debug)]
 pub struct Places {
     /// Scales of the current sensors, and how many of them there are.
