@@ -252,8 +252,8 @@ fn effect(
             Box::new(move |board, _| drop(flip(board, &mut rng, area)))
         }
         "register" => {
-            let mut rng = own(rng);
-            Box::new(move |board, _| drop(flip_any_register(board, &mut rng)))
+            let (mut rng, registers) = (own(rng), kept_registers().collect::<Vec<_>>());
+            Box::new(move |board, _| drop(flip_one(board, &mut rng, &registers)))
         }
         other => bail!("{other}: no such fault"),
     };
@@ -286,11 +286,6 @@ const AT_THE_GATES: [(u32, u32); 5] = [
     (0x4800_0024, 0xfff),
     (0x4800_0420, 0xff),
 ];
-
-/// Flips a writable bit of any register whose value the model keeps.
-pub fn flip_any_register(board: &mut Board, rng: &mut dyn Rng) -> String {
-    flip_one(board, rng, &kept_registers().collect::<Vec<_>>())
-}
 
 /// Flips one of these bits, given by addresses with their bits.
 pub fn flip_one(board: &mut Board, rng: &mut dyn Rng, registers: &[(u32, u32)]) -> String {

@@ -98,7 +98,7 @@ fn both() -> Vec<Source> {
 }
 
 /// A PWM period, ms.
-const PERIOD_MS: f64 = 1.0 / 6.0;
+pub const PERIOD_MS: f64 = 1.0 / 6.0;
 const TIM1_CR1: u32 = 0x4001_2c00;
 const OVERRUN_MS: f64 = 2.0;
 /// Characters of a flood of text at the console.

@@ -8,9 +8,10 @@ use stm32g4_unicorn::{chip::TICKS_PER_S, periph::Reset};
 use virtual_board::board::{Board, TICKS_PER_PERIOD};
 use virtual_board::faults::Script;
 
+use super::class::PERIOD_MS;
+
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;
-const PERIOD_MS: f64 = 1.0 / 6.0;
 /// Number of periods from a reset until the log has reported it.
 const REPORTED: u64 = 400;
 /// Number of periods from the switch-off of the outputs until the log has reported it.
