@@ -11,7 +11,7 @@ pub(crate) mod travel_watch;
 pub(crate) mod wiring_check;
 
 pub use heat_sink::HeatSink;
-pub use lock_monitor::{LockMonitor, LockMonitorSettings};
+pub use lock_monitor::LockMonitor;
 pub use noise_watch::NoiseWatch;
 pub use offsets::OffsetCheck;
 pub use plausibility::Prediction;

@@ -37,20 +37,16 @@ mod points;
 #[cfg(test)]
 mod tests;
 
-use core::f32::consts::{PI, TAU};
+use core::f32::consts::TAU;
 
 use crate::carrier::Asymmetry;
 use crate::table::{Grid, POINTS};
-use crate::{Angle, Dq, Fault, Motor, PERIOD_S, periods};
+use crate::{Angle, Dq, Fault, PERIOD_S, periods};
 
 pub use crate::learned::{Fitted, Learned, Verdict};
 pub use evaluate::Start;
-use points::{AVERAGE_S, LEFT, Point, SETTLE_T};
+use points::Point;
 
-/// Number of pairs from which the asymmetry is computed, and largest number of half turns for which a point may last beyond the
-/// averaging time.
-const TURNING: usize = 3;
-const MOST_HALVES: f32 = 3.0;
 /// Lag of the synchronous demodulation, samples: 19 for the averages, and 4.5 on average because they
 /// are evaluated once in ten samples.
 const LAG: f32 = 23.5;
@@ -60,15 +56,6 @@ const MOVED_RAD_PER_S: f32 = 4.66;
 /// Expected d-axis voltage of a free shaft above which the shaft is judged, as an electrical speed, rad/s. Half of that voltage
 /// means that the shaft has moved.
 const JUDGED_RAD_PER_S: f32 = 9.32;
-/// Least tangent of the lead of the flux: 5.7°. A larger lead reaches the second zero of the signal at a smaller q-axis current. A
-/// smaller lead gives a noisier sensitivity and does not show how near that zero is: with 4.6° a drive accepted a torque at which it
-/// then lost the lock.
-const LEAST_TAN_LEAD: f32 = 0.1;
-/// Largest tangent that half a step may give, 15°, and the tangent that is used if it gives more. Then the d-axis current
-/// is small, and the flux slips at every lead below half a step.
-const MOST_TAN_LEAD: f32 = 0.27;
-const LONE_TAN_LEAD: f32 = 0.2;
-
 /// Conversion from turns per control period to rad/s.
 const RAD_PER_S: f32 = TAU / PERIOD_S;
 
@@ -76,30 +63,30 @@ const RAD_PER_S: f32 = TAU / PERIOD_S;
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Learning {
     /// Longest time of a point, control periods.
-    longest: u32,
+    pub longest: u32,
     /// Table point of the first pair.
-    first: usize,
+    pub first: usize,
     /// Q-axis currents of the table.
-    grid: Grid,
+    pub grid: Grid,
     /// Number of table points to learn, without zero.
-    points: usize,
+    pub points: usize,
     /// Whether the signal is the saliency, so that its sensitivity is also learned. Otherwise it is a current difference.
-    pub(crate) normalised: bool,
+    pub normalised: bool,
     /// Sign of the saliency along the injection axis, as in [`Estimator`](crate::flux::Estimator).
-    sign: f32,
+    pub sign: f32,
     /// Lead x of the flux, rad.
-    lead: f32,
+    pub lead: f32,
     /// Settling times of the flux, in rotor time constants: from one current with a lead to the next, and at the largest
     /// current, where the lead changes its sign.
-    flux_t: [f32; 2],
+    pub flux_t: [f32; 2],
     /// D-axis current, A.
-    i_d: f32,
+    pub i_d: f32,
     /// Rotor time constant, s.
-    tau_r: f32,
+    pub tau_r: f32,
     /// sigma L_s, H.
-    leakage: f32,
+    pub leakage: f32,
     /// L_m^2 / L_r, H.
-    coupled: f32,
+    pub coupled: f32,
 }
 
 /// Input of the self-commissioning, one per control period.
@@ -172,44 +159,8 @@ pub struct Operate {
 }
 
 impl Learning {
-    /// Creates the self-commissioning for a motor with the d-axis current `i_d`, A, and currents up to `largest_a`, A peak, at the
-    /// q-axis currents of `grid`. `sign`: the sign of the saliency along the injection axis, if the signal is the saliency; `None` if it
-    /// is a current difference.
-    pub fn new(motor: &Motor, i_d: f32, largest_a: f32, grid: Grid, sign: Option<f32>) -> Self {
-        let most = fpu_sqrt::sqrtf(largest_a * largest_a - i_d * i_d) / grid.step_a();
-        let coupled = motor.coupled_inductance();
-        let half_step = 0.5 * grid.step_a() / i_d;
-        let tan_lead = if half_step > MOST_TAN_LEAD {
-            LONE_TAN_LEAD
-        } else {
-            let odd = 2.0 * libm::ceilf(0.5 * (LEAST_TAN_LEAD / half_step - 1.0)) + 1.0;
-            half_step * if odd > 1.0 { odd } else { 1.0 }
-        };
-        // With any rounding, a grid up to the largest q-axis current contains that current as a point.
-        let points = ((most + 1e-3) as usize).min(POINTS - 1);
-        let lead = libm::atanf(tan_lead);
-        // The flux makes a half turn in the time pi tau_r i_d / i_q.
-        let half_turn_s = PI * motor.tau_r() * i_d / grid.step_a();
-        let first = (libm::ceilf(half_turn_s / AVERAGE_S) as usize + TURNING - 1).min(points);
-        let slowest = first.saturating_sub(TURNING - 1).max(1) as f32;
-        Self {
-            longest: periods(AVERAGE_S + MOST_HALVES * half_turn_s / slowest),
-            first,
-            grid,
-            points,
-            normalised: sign.is_some(),
-            sign: sign.unwrap_or(1.0),
-            lead,
-            flux_t: [2.0, 2.0 * points as f32].map(|steps| {
-                let change = steps * grid.step_a() * libm::sinf(lead) / i_d;
-                libm::logf(change / LEFT).max(SETTLE_T)
-            }),
-            i_d,
-            tau_r: motor.tau_r(),
-            leakage: motor.l_ls + motor.l_m - coupled,
-            coupled,
-        }
-    }
+    /// Number of pairs from which the asymmetry is computed.
+    pub const TURNING: usize = 3;
 
     fn operate(&self, point: Point) -> Operate {
         let sign = if point.mirrored { -1.0 } else { 1.0 };
@@ -273,8 +224,8 @@ impl Learning {
         let mean = 1.0 / s.count as f32;
         let (signal, voltage) = (s.signal * mean, s.voltage * mean);
         if point.turns {
-            if state.point <= 2 * TURNING {
-                let share = mean / self.points.clamp(1, TURNING) as f32;
+            if state.point <= 2 * Self::TURNING {
+                let share = mean / self.points.clamp(1, Self::TURNING) as f32;
                 state.turning.sin += share * s.twice.q;
                 state.turning.cos += share * s.twice.d;
             }

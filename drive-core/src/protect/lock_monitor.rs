@@ -39,7 +39,6 @@
 
 use crate::Fault;
 use crate::carrier::Saliency;
-use crate::carrier::injection::CARRIER_S;
 use crate::learned::Learned;
 use crate::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 
@@ -47,40 +46,24 @@ use crate::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LockMonitor {
     /// Q-axis currents of the table of the injection current.
-    grid: Grid,
+    pub grid: Grid,
     /// 1 / ratio^2 of the table of the injection current.
-    inverse_square: [f32; POINTS],
+    pub inverse_square: [f32; POINTS],
     /// Saliency deficit per relative change of the squared injection current: -1/k, with the other sign if the injection lies along
     /// the flux.
-    per_change: [f32; POINTS],
-    /// Sign of the saliency, see [`LockMonitorSettings::sign`].
-    sign: f32,
-    /// Share of the newest value in the mean deficit.
-    smoothing: f32,
-    /// Allowed deficit, and whether the sensitivity is positive, which determines the limit of a negative deficit.
-    allowed: f32,
-    is_positive: bool,
-    /// Change of the q-axis current in an injection period above which the monitor pauses, A.
-    moved: f32,
-    /// Square of the minimum injection current, A^2.
-    least: f32,
-}
-
-/// Settings of the monitor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LockMonitorSettings {
-    /// Saliency sensitivity, on the grid of the table of the injection current.
-    pub slope: SlopeTable,
-    /// Time constant of the mean deficit, s.
-    pub smoothing_s: f32,
-    /// Allowed mean deficit; 1 corresponds to zero flux.
-    pub allowed: f32,
-    /// Expected injection current along the injection axis, A peak.
-    pub carrier_a: f32,
+    pub per_change: [f32; POINTS],
     /// Sign of the saliency along the injection axis, as in [`Estimator`](crate::flux::Estimator).
     pub sign: f32,
+    /// Share of the newest value in the mean deficit.
+    pub smoothing: f32,
+    /// Allowed mean deficit, where 1 corresponds to zero flux, and whether the sensitivity is positive, which determines the limit of a
+    /// negative deficit.
+    pub allowed: f32,
+    pub is_positive: bool,
     /// Change of the q-axis current in an injection period above which the monitor pauses, A.
-    pub moved_a: f32,
+    pub moved: f32,
+    /// Square of the minimum injection current, A^2.
+    pub least: f32,
 }
 
 /// State of the monitor.
@@ -116,9 +99,6 @@ impl LockMonitorState {
 const AVERAGED: u8 = 30;
 /// Injection periods for a baseline: 0.1 s.
 const MEASURED: u8 = 60;
-/// Minimum injection current as a share of the expected one. With an open phase the injection current is
-/// reduced by the squared cosine of the angle between the injection axis and the remaining current axis.
-const LEAST_CARRIER: f32 = 0.5;
 /// Consecutive injection periods with too little current until the fault. The averages of the demodulation need four to fill.
 const WEAK_PERIODS: u8 = 8;
 
@@ -132,37 +112,23 @@ const REST: u8 = 12;
 /// Pauses therefore take 40 % of the time at most, and 24 injection periods at once.
 const ALLOWANCE: (u8, u8, u8) = (3, 2, 72);
 
-fn per_change(slope: &SlopeTable, sign: f32) -> [f32; POINTS] {
-    slope.inverses(MOST_UNIT).map(|inverse| -sign * inverse)
-}
-
-fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
-    table.points().map(|r| 1.0 / (r * r))
-}
-
 impl LockMonitor {
-    /// Creates the monitor with the injection current over i_q of `table`.
-    pub fn new(table: &CarrierTable, s: &LockMonitorSettings) -> Self {
-        let least = LEAST_CARRIER * s.carrier_a;
-        Self {
-            grid: table.grid(),
-            inverse_square: inverse_square(table),
-            per_change: per_change(&s.slope, s.sign),
-            sign: s.sign,
-            is_positive: s.slope.at_rest() > 0.0,
-            moved: s.moved_a,
-            smoothing: CARRIER_S / (s.smoothing_s + CARRIER_S),
-            allowed: s.allowed,
-            least: least * least,
-        }
+    /// Returns [`per_change`](Self::per_change) of a saliency sensitivity.
+    pub fn per_change(slope: &SlopeTable, sign: f32) -> [f32; POINTS] {
+        slope.inverses(MOST_UNIT).map(|inverse| -sign * inverse)
+    }
+
+    /// Returns [`inverse_square`](Self::inverse_square) of the injection current over i_q.
+    pub fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
+        table.points().map(|r| 1.0 / (r * r))
     }
 
     /// Takes an accepted result of a self-commissioning.
     pub fn take(&mut self, learned: &Learned) {
         if let (Some(carrier), Some(slope)) = (&learned.carrier, &learned.slope) {
-            (self.grid, self.inverse_square) = (carrier.grid(), inverse_square(carrier));
+            (self.grid, self.inverse_square) = (carrier.grid(), Self::inverse_square(carrier));
             (self.per_change, self.is_positive) =
-                (per_change(slope, self.sign), slope.at_rest() > 0.0);
+                (Self::per_change(slope, self.sign), slope.at_rest() > 0.0);
         }
     }
 

@@ -9,23 +9,23 @@
 //! looks like a saliency of 0.0135.) Then the flux is built up again.
 
 use crate::learned::Learned;
-use crate::{SQRT_3, UnitVector, periods};
+use crate::{SQRT_3, UnitVector};
 
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SaliencyCheck {
     /// Settling time of current and averages, control periods.
-    settle: u32,
+    pub settle: u32,
     /// Averaging time, control periods.
-    average: u32,
+    pub average: u32,
     /// Time to build the flux up again, control periods.
-    restore: u32,
+    pub restore: u32,
     /// Threshold of the mean saliency, with its sign.
-    least: f32,
+    pub least: f32,
     /// Mean saliency over the decaying flux at 60°, relative to the saliency at nominal flux.
-    seen_share: f32,
+    pub seen_share: f32,
     /// 1 / number of averaged samples.
-    per_average: f32,
+    pub per_average: f32,
 }
 
 /// State of the check.
@@ -47,51 +47,13 @@ pub enum SaliencyCheckAction {
     Failed,
 }
 
-/// Settling time of the averages of the demodulation, s.
-const SETTLE_S: f32 = 0.020;
-/// Delay of the averages, s, by which the flux that they show is earlier.
-const DELAY_S: f32 = 0.004;
-/// Averaging time in rotor time constants, and its limits, s. A longer average would contain less flux.
-const AVERAGE_T: f32 = 0.645;
-const AVERAGE_S: (f32, f32) = (0.03, 0.4);
-/// Threshold relative to the mean for the saliency of the settings: midway between a tenth and half of it. With the
-/// 3.5 % of the dissertation's motor, both are more than four standard deviations away, with noise of 5 mA.
-const LEAST_SHARE: f32 = 0.3;
 /// Least flux-fixed saliency relative to the sensitivity, which is twice the effective saliency, at which a learned motor is
 /// checked.
 const LEAST_SEEN: f32 = 0.375;
-/// Time to build the flux up again, in rotor time constants, after which it is within 5 %.
-const RESTORE_T: f32 = 2.4;
-/// Least time to build the flux up again, s: five time constants of the mean injection current that the lock monitor uses
-/// afterwards.
-const RESTORE_S: f32 = 0.25;
-
-/// Returns the mean saliency at 60° over a window of length w of the decaying flux, relative to the saliency at nominal flux.
-///
-/// The flux-fixed saliency is assumed to follow 2 r/(1 + r) with the square r = e^(-2t/tau_r) of the relative flux. The
-/// mean from t_0 to t_1 = t_0 + w is 0.866 (tau_r/w) ln((1 + e^(-2 t_0/tau_r)) / (1 + e^(-2 t_1/tau_r))): 0.54 with the
-/// dissertation's motor.
-fn seen_share(window: f32, tau_r: f32) -> f32 {
-    let begin = SETTLE_S - DELAY_S;
-    let sum = |t: f32| 1.0 + libm::expf(-2.0 * t / tau_r);
-    0.5 * SQRT_3 * tau_r / window * libm::logf(sum(begin) / sum(begin + window))
-}
-
 impl SaliencyCheck {
-    /// Creates the check for a flux-fixed saliency (with its sign) and the rotor time constant `tau_r`, s.
-    #[cold]
-    pub fn new(flux_saliency: f32, tau_r: f32) -> Self {
-        let window = (AVERAGE_T * tau_r).clamp(AVERAGE_S.0, AVERAGE_S.1);
-        let (average, seen_share) = (periods(window), seen_share(window, tau_r));
-        Self {
-            settle: periods(SETTLE_S),
-            average,
-            restore: periods((RESTORE_T * tau_r).max(RESTORE_S)),
-            least: LEAST_SHARE * seen_share * flux_saliency,
-            seen_share,
-            per_average: 1.0 / average as f32,
-        }
-    }
+    /// Threshold relative to the mean for the saliency of the settings: midway between a tenth and half of it. With the
+    /// 3.5 % of the dissertation's motor, both are more than four standard deviations away, with noise of 5 mA.
+    pub const LEAST_SHARE: f32 = 0.3;
 
     /// Returns the check for a learned motor, which expects the saliency that the check of the self-commissioning has
     /// measured. None if that saliency is less than 3/8 of the sensitivity or has the other sign: a saliency that falls
@@ -100,7 +62,7 @@ impl SaliencyCheck {
     pub fn of_learned(&self, learned: &Learned) -> Option<Self> {
         let (seen, slope) = (learned.flux_saliency, learned.slope_at_rest);
         let suits = seen * slope > 0.0 && seen.abs() >= LEAST_SEEN * slope.abs();
-        suits.then_some(Self { least: LEAST_SHARE * self.seen_share * seen, ..*self })
+        suits.then_some(Self { least: Self::LEAST_SHARE * self.seen_share * seen, ..*self })
     }
 
     /// Returns the mean saliency that a finished check has measured.
@@ -141,6 +103,7 @@ impl SaliencyCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::design::saliency_check::design;
 
     /// Runs the check with a constant saliency. Returns the periods in each phase, the last phase, and the state.
     fn run(check: &SaliencyCheck, q: f32) -> ([usize; 2], SaliencyCheckAction, SaliencyCheckState) {
@@ -158,7 +121,7 @@ mod tests {
     #[test]
     fn enough_saliency_of_the_right_sign_passes() {
         for expected in [-0.035, 0.05] {
-            let check = SaliencyCheck::new(expected, 0.186);
+            let check = design(expected, 0.186);
             // The mean over the decaying flux is 0.5402 of the saliency; 0.3 of the expected value is enough.
             for (share, passes) in
                 [(1.0, true), (2.0, true), (0.31, true), (0.29, false), (-1.0, false)]
@@ -181,14 +144,14 @@ mod tests {
     /// for 250 Hz, would be magnetised after only 58 ms.
     #[test]
     fn a_fast_rotor_waits_for_the_baseline() {
-        let check = SaliencyCheck::new(-0.035, 0.024);
+        let check = design(-0.035, 0.024);
         let (count, end, _) = run(&check, -0.035);
         assert_eq!((end, count[1]), (SaliencyCheckAction::Passed, 1500));
     }
 
     #[test]
     fn samples_before_settling_do_not_count() {
-        let check = SaliencyCheck::new(-0.035, 0.186);
+        let check = design(-0.035, 0.186);
         let mut state = SaliencyCheckState::default();
         for elapsed in 0..841 {
             let q = if elapsed < 120 || elapsed == 840 { 9.0 } else { -0.5 * 0.035 };

@@ -2,10 +2,13 @@
 
 mod estimator;
 mod flying_start;
+pub(crate) mod learning;
+pub(crate) mod saliency_check;
 mod scalar;
 
 use core::f32::consts::TAU;
 
+use self::estimator::CARRIER_S;
 use crate::settings::{CurrentSensors, InjectionAxis, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, MotionDesign, SpeedSource, TuningError};
 use drive_core::carrier::{AtStart, Injection};
@@ -13,8 +16,8 @@ use drive_core::current::{DeadTime, DqPi, InverterDrop, Modulator, Pi, VoltageLi
 use drive_core::flux::{AngleLoop, Indirect, Leakage, Observer};
 use drive_core::printed::DemodulatorKind;
 use drive_core::protect::{
-    Body, LockMonitor, LockMonitorSettings, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck,
-    Thermal, TravelWatch, WiringCheck, WiringSettings,
+    Body, LockMonitor, NoiseWatch, OffsetCheck, Prediction, Thermal, TravelWatch, WiringCheck,
+    WiringSettings,
 };
 use drive_core::{
     Angle, AngleSource, Coefficients, DcLink, FirstOrder, FrontEnd, Learning, Motion, PERIOD_S,
@@ -39,6 +42,9 @@ const UNEXPLAINED_MEAN: [f32; 2] = [0.5, 0.25];
 /// Change of the q-axis current in an injection period above which the lock monitor pauses, with the dissertation's motor,
 /// A: 18 A/s.
 const MOVED_A: f32 = 0.03;
+/// Minimum injection current as a share of the expected one. With an open phase the injection current is
+/// reduced by the squared cosine of the angle between the injection axis and the remaining current axis.
+const LEAST_CARRIER: f32 = 0.5;
 /// Largest accepted offset of a current sensor with the dissertation's sensors, A.
 const LARGEST_OFFSET_A: f32 = 0.2;
 /// Largest mean sum of the three phase currents with the dissertation's sensors, A: 7 % of the range.
@@ -137,7 +143,7 @@ impl Settings {
             lock_monitor: self.watches_lock().then(|| self.lock_monitor(carrier_a)),
             // Only a sensorless start with the synchronous demodulation is checked.
             saliency_check: (t.check && tracks)
-                .then(|| SaliencyCheck::new(t.flux_saliency, m.tau_r())),
+                .then(|| saliency_check::design(t.flux_saliency, m.tau_r())),
             noise_watch: (self.angle_source == AngleSource::Injection).then(|| {
                 NoiseWatch::new(t.flux_saliency, carrier_a, self.share_of_range(estimator::NOISE_A))
             }),
@@ -201,7 +207,7 @@ impl Settings {
     pub fn learning(&self) -> Learning {
         let synchronous = self.injection.demodulator == DemodulatorKind::Synchronous;
         let sign = synchronous.then(|| self.injection.axis.sign());
-        Learning::new(&self.motor, self.i_d(), self.current_limit_a(), self.grid(), sign)
+        learning::plan(&self.motor, self.i_d(), self.current_limit_a(), self.grid(), sign)
     }
 
     /// Returns the selection of the phases to be used, with three shunts.
@@ -215,16 +221,19 @@ impl Settings {
 
     /// Returns the lock monitor; `carrier_a` is the expected injection current along the injection axis, A peak.
     fn lock_monitor(&self, carrier_a: f32) -> LockMonitor {
-        let t = &self.injection.synchronous;
-        let settings = LockMonitorSettings {
-            slope: self.slope(),
-            moved_a: self.share_of_rated(MOVED_A),
-            smoothing_s: t.deficit_s,
+        let (t, sign) = (&self.injection.synchronous, self.injection.axis.sign());
+        let (carrier, slope, least) = (self.carrier(), self.slope(), LEAST_CARRIER * carrier_a);
+        LockMonitor {
+            grid: carrier.grid(),
+            inverse_square: LockMonitor::inverse_square(&carrier),
+            per_change: LockMonitor::per_change(&slope, sign),
+            sign,
+            smoothing: CARRIER_S / (t.deficit_s + CARRIER_S),
             allowed: t.allowed_deficit,
-            carrier_a,
-            sign: self.injection.axis.sign(),
-        };
-        LockMonitor::new(&self.carrier(), &settings)
+            is_positive: slope.at_rest() > 0.0,
+            moved: self.share_of_rated(MOVED_A),
+            least: least * least,
+        }
     }
 
     fn motor_plant(&self) -> Result<FirstOrder, TuningError> {

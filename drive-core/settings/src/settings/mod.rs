@@ -5,7 +5,7 @@
 //! dissertation.
 
 mod declare;
-mod design;
+pub(crate) mod design;
 pub mod entry;
 mod list;
 mod motor_sensor;

@@ -2,20 +2,16 @@
 
 use core::f32::consts::PI;
 
-use super::{Learning, LearningState, TURNING};
+use super::{Learning, LearningState};
 
 /// Settling time of the q-axis current and the averages at every point, s, and of slip and flux, in rotor time constants. If the
 /// q-axis current changes, the saturation changes; if the current changes its sign, the flux turns in the frame. (With 0.2, motors
 /// whose rotor time constant is above 0.45 s had an even part of the signal that spread by up to 0.007.)
 const SETTLE_S: f32 = 0.1;
-pub(super) const SETTLE_T: f32 = 1.0;
-/// Settling time at the first point, in rotor time constants, and allowed rest of a change of the flux at any other
-/// point, relative to the flux.
+const SETTLE_T: f32 = 1.0;
+/// Settling time at the first point, in rotor time constants.
 const FIRST_T: f32 = 2.0;
-pub(super) const LEFT: f32 = 0.02;
-/// Averaging time at a point of the offset, and at a point of the sensitivity under load, s. One second reduces sensor noise of 5
-/// mA to 0.2°.
-pub(super) const AVERAGE_S: f32 = 1.0;
+/// Averaging time at a point of the sensitivity under load, s.
 const SLOPE_S: f32 = 0.5;
 
 /// A point of the self-commissioning.
@@ -35,6 +31,9 @@ pub(super) struct Point {
 }
 
 impl Learning {
+    /// Averaging time at a point of the offset, s. One second reduces sensor noise of 5 mA to 0.2°.
+    pub const AVERAGE_S: f32 = 1.0;
+
     /// Returns the number of points: two for every current, two for every other current with either lead of the flux, and two
     /// for a lead without current.
     pub fn points(&self) -> usize {
@@ -73,9 +72,9 @@ impl Learning {
         let (n, lead, flux_t, average_s) = match pair.checked_sub(self.points) {
             None => {
                 let n = if pair < self.first { self.first } else { self.points + self.first };
-                (n - pair, 0, if pair == 0 { FIRST_T } else { 0.0 }, AVERAGE_S)
+                (n - pair, 0, if pair == 0 { FIRST_T } else { 0.0 }, Self::AVERAGE_S)
             }
-            Some(0) => (0, 1, SETTLE_T, AVERAGE_S),
+            Some(0) => (0, 1, SETTLE_T, Self::AVERAGE_S),
             Some(up) if up <= led => (self.points - 2 * (led - up), 1, step_t, SLOPE_S),
             Some(down) => {
                 let below = down - led - 1;
@@ -92,7 +91,7 @@ impl Learning {
             mirrored,
             settle_s,
             average_s,
-            turns: lead == 0 && n + TURNING > self.first,
+            turns: lead == 0 && n + Self::TURNING > self.first,
         }
     }
 }

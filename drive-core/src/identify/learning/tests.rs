@@ -1,9 +1,10 @@
 //! Tests of the self-commissioning on signals and voltages of given motors and sensors.
 #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
 use super::*;
-use crate::UnitVector;
 use crate::carrier::Asymmetry;
+use crate::settings::design::learning::plan;
 use crate::table::{ReferenceTable, SlopeTable};
+use crate::{Motor, UnitVector};
 use core::f64::consts::TAU as TURN;
 
 /// Injection current without q-axis current, A.
@@ -15,7 +16,7 @@ fn carrier(i_q: f32) -> f32 {
 }
 
 fn learning() -> Learning {
-    Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, Some(1.0))
+    plan(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, Some(1.0))
 }
 
 /// Returns the measurements before the points: no check, and the injection current without q-axis current.
@@ -129,7 +130,7 @@ fn splits_the_reference_from_slope_and_mismatch() {
 #[test]
 fn along_the_flux_the_same_is_learned() {
     let q = |i_q, lead, theta| negative_sequence(0.01, theta) - sound(i_q, lead, theta);
-    let learning = Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, Some(-1.0));
+    let learning = plan(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, Some(-1.0));
     let (next, state) = learn_with(&learning, q, locked);
     assert_eq!(next, Ok(()));
     let (baseline, axis) = (CARRIER * CARRIER * 1.01, UnitVector { cos: 1.0, sin: 0.0 });
@@ -246,7 +247,7 @@ fn the_flux_turns_at_every_point() {
     let all = |at: (f32, f32)| [(at, at.1), (at, left(at))];
     for ((i_d, largest), end) in currents.into_iter().flat_map(all) {
         let grid = Grid::for_current(end);
-        let learning = Learning::new(&Motor::default(), i_d, largest, grid, Some(1.0));
+        let learning = plan(&Motor::default(), i_d, largest, grid, Some(1.0));
         assert!(end == largest || learning.points == 14, "{i_d}: {}", learning.points);
         let tan = learning.lead.tan();
         assert!((0.099..0.3).contains(&tan), "{i_d}: {tan}");
@@ -276,7 +277,7 @@ fn the_flux_turns_at_every_point() {
         assert!(of(1).eq([0].into_iter().chain(led.into_iter().rev())), "{seen:?}");
     }
     // A current difference has no sensitivity.
-    let learning = Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, None);
+    let learning = plan(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, None);
     assert_eq!(learning.points(), 26);
 }
 

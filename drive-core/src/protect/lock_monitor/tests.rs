@@ -5,17 +5,19 @@ use super::*;
 /// Returns a monitor with a nominal injection current of 0.26 A, 120 ms, and the sensitivity of a saliency `a` that is fixed to the
 /// flux. `sign`: 1 with the injection across the flux, -1 along it.
 fn monitor_of(a: f32, sign: f32) -> LockMonitor {
-    LockMonitor::new(
-        &CarrierTable::default(),
-        &LockMonitorSettings {
-            slope: SlopeTable::of_flux_saliency(Grid::REFERENCE, a),
-            smoothing_s: 0.12,
-            allowed: 0.55,
-            carrier_a: 0.26,
-            sign,
-            moved_a: 0.03,
-        },
-    )
+    let slope = SlopeTable::of_flux_saliency(Grid::REFERENCE, a);
+    let carrier = CarrierTable::default();
+    LockMonitor {
+        grid: Grid::REFERENCE,
+        inverse_square: LockMonitor::inverse_square(&carrier),
+        per_change: LockMonitor::per_change(&slope, sign),
+        sign,
+        smoothing: 1.0 / (1.0 + 600.0 * 0.12),
+        allowed: 0.55,
+        is_positive: a > 0.0,
+        moved: 0.03,
+        least: 0.13 * 0.13,
+    }
 }
 
 fn monitor() -> LockMonitor {
@@ -163,15 +165,7 @@ fn the_baseline_is_a_mean_of_the_last_carrier_periods() {
 
 #[test]
 fn the_carrier_of_a_lost_flux_ends_the_lock() {
-    let settings = LockMonitorSettings {
-        slope: SlopeTable::of_flux_saliency(Grid::REFERENCE, -0.035),
-        smoothing_s: 0.12,
-        allowed: 0.55,
-        carrier_a: 0.26,
-        sign: 1.0,
-        moved_a: 0.03,
-    };
-    let monitor = LockMonitor::new(&CarrierTable::default(), &settings);
+    let monitor = monitor();
     let mut state = LockMonitorState::default();
     let carrier = |a: f32| Saliency { q: 0.0, carrier_squared: a * a, i_q: 0.0 };
     for _ in 0..600 {

@@ -14,6 +14,8 @@ use drive_core::{FirstOrder, PERIOD_S};
 /// injection current.
 const BPF_GROUP_DELAY: f32 = 8.83;
 
+/// Injection period, s.
+pub(super) const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
 /// Noise of a current sensor with the dissertation's sensors, A.
 pub(super) const NOISE_A: f32 = 0.005;
 /// Standard deviation of the saliency relative to that noise over the injection current, with the correlation of the averages.
@@ -83,7 +85,6 @@ impl Settings {
     /// Returns the variances of the angle filter, from motor, inverter and sensors, for an amplitude `carrier_a` of the injection
     /// current, A.
     fn angle_filter(&self, carrier_a: f32) -> AngleFilter {
-        const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
         let (m, i_d, noise_a) = (&self.motor, self.i_d(), self.share_of_range(NOISE_A));
         let flux = m.coupled_inductance() * i_d;
         // This is the speed error of the observer per change of the current.
