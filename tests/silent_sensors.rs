@@ -1,5 +1,5 @@
 //! Procedure: at speed, where the injection is off, a current sensor opens or sticks. The drive must switch off within half a turn of the
-//! flux or 8 ms, whichever is later.
+//! flux or 8.5 ms, whichever is later.
 #![allow(clippy::disallowed_methods)]
 
 use drive_core::{Command, Mode, State};
@@ -11,7 +11,7 @@ use hil_sim::rig::{RATE_HZ, Rig};
 /// Pole pairs of the motor.
 const POLE_PAIRS: f64 = 2.0;
 /// Longest time if half a turn of the flux is shorter, s.
-const LONGEST_S: f64 = 0.008;
+const LONGEST_S: f64 = 0.0085;
 
 /// A drive that has learned and regulates torque on a shaft at this speed.
 fn at_speed(rpm: f64) -> Rig {

@@ -77,6 +77,7 @@ class Motor:
         plate = data["nameplate"]
         self.rated_rpm = plate["speed_rpm"]
         self.rated_nm = plate["power_w"] / (TAU / 60 * self.rated_rpm)
+        self.rated_flux = math.sqrt(2 / 3) * plate["voltage_v"] / (TAU * plate["frequency_hz"])
         self.dc_link = data["inverter"]["dc_link_v"]
 
     def torque(self, i_d, i_q):
@@ -85,6 +86,7 @@ class Motor:
 
 M = Motor()
 I_D = 0.7  # A, `sequence.i_d` of this motor: section 3.10 of the source
+LIMIT = 3.5  # A, `limits.current_a` of this motor
 I_D_HIGH = 2.31  # A, `sequence.flux = high`
 A_PSI = constant(MACHINE, "a_psi")
 B1 = constant(MACHINE, "b1")
@@ -206,11 +208,15 @@ class AngleFilter:
         else:
             self.rate = (constant(ESTIMATOR, "LOAD_STEP") * M.rated_nm * M.pairs / M.inertia) ** 2
         self.slow_s = min(constant(ESTIMATOR, "SLOW_OF_TAU_R") * M.tau, constant(ESTIMATOR, "SLOW_S"))
-        self.f = constant(ESTIMATOR, "FLUX_SHARE") / (M.tau * i_d) * rotor * i_q
-        self.stator = rotor + i_q / (i_d * M.tau)  # w_s
+        slip = M.alpha * math.sqrt(LIMIT**2 - i_d**2) / i_d  # at the current limit
+        self.slow = math.hypot(constant(ESTIMATOR, "SLOW"), constant(ESTIMATOR, "SLOW_OF_RATED") * TAU * 60, constant(ESTIMATOR, "SLOW_OF_SLIP") * slip)
         al, w = M.alpha, rotor
         gain = 2 * (constant(OBSERVER, "GAIN_AT_STANDSTILL") * al + constant(OBSERVER, "GAIN_PER_SPEED") * abs(w)) / (al * al + w * w)
-        self.l = gain * w * self.stator
+        self.alpha = al if observer else 0.0  # of the filter
+        self.l = gain * w * w - al
+        y = constant(ESTIMATOR, "SATURATED") * (flux / M.rated_flux) ** constant(ESTIMATOR, "KNEE")
+        self.delta = self.alpha * (1 + (constant(ESTIMATOR, "KNEE") + 1) * y) / (1 + y)
+        self.grown = w * (1 + gain * self.delta)
         self.h = M.r_s * (i_q - gain * w * i_d) / flux
         self.observer = observer
         self.i_q, self.i_d, self.rotor = i_q, i_d, rotor
@@ -219,22 +225,32 @@ class AngleFilter:
 
     def settle(self, periods=12000):
         kept, r_kept = 1 - T / self.slow_s, 1 - self.decay
-        slow = constant(FILTER, "SLOW")
-        f = [[1, T, 0, 0, 0], [0, 1, T, 0, 0], [0, 0, 1, 0, 0], [0, 0, 0, r_kept, 0], [kept * T * self.f, 0, 0, 0, kept]]
-        noise = [0, constant(FILTER, "SPEED_NOISE"), self.rate, 0.01**2, 2 / self.slow_s * slow**2]
-        first = [0.1**2, 5.0**2, 100.0**2, constant(OBSERVER, "MEASURED") ** 2, slow**2]
-        p = [[first[i] if i == j else 0.0 for j in range(5)] for i in range(5)]
-        n = range(5)
+        growth = constant(FILTER, "GROWTH")
+        # The rotor equation turns (e, d) by the slip, and both decay; a sample later the rest of F.
+        turn, decay, shorter = self.alpha * T * self.i_q / self.i_d, math.exp(-self.alpha * T), math.exp(-self.delta * T)
+        c, s = math.cos(turn), math.sin(turn)
+        f = [
+            [decay * c, T, 0, 0, 0, -decay * s],
+            [0, 1, T, 0, 0, 0],
+            [0, 0, 1, 0, 0, 0],
+            [0, 0, 0, r_kept, 0, 0],
+            [0, 0, 0, 0, kept, 0],
+            [shorter * s, 0, 0, 0, 0, shorter * c],
+        ]
+        noise = [0, constant(ESTIMATOR, "SLIP") ** 2, self.rate, 0.01**2, 2 / self.slow_s * self.slow**2, (1 - math.exp(-2 * self.delta * T)) / T * growth**2]
+        first = [0.1**2, 5.0**2, 100.0**2, constant(OBSERVER, "MEASURED") ** 2, self.slow**2, growth**2]
+        n = range(6)
+        p = [[first[i] if i == j else 0.0 for j in n] for i in n]
         last = 0
         for step in range(periods):
             fp = [[sum(f[i][k] * p[k][j] for k in n if f[i][k]) for j in n] for i in n]
             p = [[sum(fp[i][k] * f[j][k] for k in n if f[j][k]) + (T * noise[i] if i == j else 0) for j in n] for i in n]
             before = p[0][0]
-            self.k2 = [0.0] * 5
+            self.k2 = [0.0] * 6
             if self.observer:
-                h = [self.l, 1, 0, self.h, 1]
+                h = [self.l, 1, 0, self.h, 1, self.grown]
                 p, self.k2 = reduced(p, h, self.r2)
-            p, self.k1 = reduced(p, [1, 0, 0, 0, 0], self.r1)
+            p, self.k1 = reduced(p, [1, 0, 0, 0, 0, 0], self.r1)
             if step % 200 == 199:
                 if abs(p[0][0] / (last or 1) - 1) < 1e-9:
                     break
@@ -257,28 +273,29 @@ class AngleFilter:
         hold = (1 - cmath.exp(-s * T)) / (s * T)
         d2 = hold
         t = self.i_q / self.i_d
-        # unknowns: e, m, w_hat, a_hat, r_hat, b_hat, z2 (after the subtraction of b_hat and w_hat)
+        # unknowns: e, m, w_hat, a_hat, r_hat, b_hat, d_hat, z2 (after the subtraction of what the filter expects)
         inv = 1 / M.tau if pull else 0.0
         k1, k2 = self.k1, self.k2
         # update by z2: x = k2 (z2 - ...), then by z1: k1 (z1 - x_e)
-        g = [k2[n] - k1[n] * k2[0] for n in range(5)]  # share of z2 in the corrections
+        g = [k2[n] - k1[n] * k2[0] for n in range(6)]  # share of z2 in the corrections
         # correction c_n = g_n z2 + k1_n z1
-        names = "e m w a r b z2".split()
+        names = "e m w a r b d z2".split()
         rows, right = [], []
 
         def row(rhs, **terms):
             rows.append([terms.get(name, 0) for name in names])
             right.append(rhs)
 
-        # e' = -(e + t m)/tau - w - c_e/T, the corrections held for a period
-        row(-hold * k1[0] / T, e=s + inv, m=t * inv, w=hold, z2=hold * g[0] / T)
+        # e' = -(e + t m)/tau - w - c_e/T + alpha t d, the corrections held for a period
+        row(-hold * k1[0] / T, e=s + inv, m=t * inv, w=hold, d=-hold * self.alpha * t, z2=hold * g[0] / T)
         row(0, m=s + 1 / M.tau, e=-t / M.tau)
         row(k1[1], w=z - 1, a=-T, z2=-g[1])
         row(k1[2], a=z - 1, z2=-g[2])
         row(k1[3], r=z - 1 + self.decay, z2=-g[3])
         row(k1[4], b=z - (1 - T / self.slow_s), z2=-g[4])
+        row(k1[5], d=z - (1 - T * self.delta), z2=-g[5])
         if self.observer:
-            row(0, z2=1, w=1, b=1, r=self.h, e=-d2 * (self.l - inv), m=-d2 * self.rotor)
+            row(0, z2=1, w=1, b=1, r=self.h, d=self.grown, e=-d2 * self.l, m=-d2 * self.grown)
         else:
             row(0, z2=1)
         x = solve(rows, right)
@@ -329,7 +346,7 @@ Filter = functools.cache(AngleFilter)
 
 
 def reduced(p, h, variance):
-    n = range(5)
+    n = range(len(h))
     ph = [sum(p[i][j] * h[j] for j in n) for i in n]
     expected = sum(h[i] * ph[i] for i in n) + variance
     gain = [x / expected for x in ph]
@@ -1543,8 +1560,9 @@ def quotes():
             f"({math.sqrt(Filter(1.0, 0.0).r2):.1f} rad/s)²",
             f"({math.sqrt(Filter(1.0, 0.0).rate):.0f} rad/s²)²",
             f"a load step of {100 * constant(ESTIMATOR, 'LOAD_STEP'):.0f} % of the rated torque",
-            f"{constant(FILTER, 'SPEED_NOISE'):.0f} (rad/s)²",
-            f"{constant(FILTER, 'SLOW')} rad/s, τ_b = {Filter(1.0, 0.0).slow_s:.1f} s",
+            f"{constant(ESTIMATOR, 'SLIP') ** 2:.0f} (rad/s)²",
+            f"√({constant(ESTIMATOR, 'SLOW')}² + ({constant(ESTIMATOR, 'SLOW_OF_RATED')} ω_N)² + ({constant(ESTIMATOR, 'SLOW_OF_SLIP')} s_max)²) | {Filter(1.0, 0.0).slow:.1f} rad/s, τ_b = {Filter(1.0, 0.0).slow_s:.1f} s",
+            f"| standard deviation of d | what the rotor equation does not explain | {100 * constant(FILTER, 'GROWTH'):.1f} % |",
             f"| τ_s | decay to the measured resistance | {constant(OBSERVER, 'RESISTANCE_S'):.0f} s |",
             f"`injection.bandwidth_hz` sets ω_n = 2π · {constant(SETTINGS, 'bandwidth_hz')} Hz",
             f"Well above 1/τ_r = {M.alpha:.1f} /s",

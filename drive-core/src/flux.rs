@@ -2,6 +2,7 @@
 
 pub(crate) mod angle_filter;
 pub(crate) mod catch;
+mod covariance;
 pub(crate) mod estimator;
 pub(crate) mod hand_over;
 pub(crate) mod indirect;

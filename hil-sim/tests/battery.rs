@@ -19,7 +19,8 @@ fn sound_runs_that_are_stopped_are_told_from_others() {
     let sound = battery(&["observer.enabled=no", "injection.tracked_rpm=100", "runs=12"]);
     assert!(get(&sound, "trips") >= 4.0, "{sound:?}");
     assert_eq!(get(&sound, "sound_runs_stopped"), get(&sound, "trips"));
-    let wrong = battery(&["saliency.a_psi=0", "injection.check=no", "runs=48"]);
+    let wrong =
+        battery(&["observer.enabled=no", "saliency.a_psi=0", "injection.check=no", "runs=48"]);
     assert!(get(&wrong, "trips") >= 8.0, "{wrong:?}");
     assert!(get(&wrong, "sound_runs_stopped") <= 0.25 * get(&wrong, "trips"), "{wrong:?}");
 }

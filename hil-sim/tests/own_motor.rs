@@ -117,7 +117,7 @@ fn commission_and_run(plates: &[(&str, &str)]) {
         let steps = run("torque-steps", "r");
         let error = |name: &str| steps["metrics"][name].as_f64().expect("an angle");
         assert!(error("angle_error_rms_deg") < 2.5, "{plate}: {steps}");
-        assert!(error("angle_error_max_deg") < 8.0, "{plate}: {steps}");
+        assert!(error("angle_error_max_deg") < 8.5, "{plate}: {steps}");
     }
 }
 

@@ -198,22 +198,23 @@ fn the_plants_of_the_current_loop_are_identified_on_request() {
     }
 }
 
-/// A free shaft without and with an elastic coupling of 30 Hz between two equal inertias, with 3 % of the rated torque as friction.
+/// A free shaft without and with an elastic coupling between two equal inertias, whose resonance is at this frequency, with 3 % of the
+/// rated torque as friction. (On `krause-3hp` couplings of 15 and 30 Hz are not seen, and do not disturb the loop.)
 #[test]
 fn a_shaft_that_rings_gets_a_slower_speed_loop() {
-    for (name, inertia, coupled) in [
-        ("motulator-2kw2", 0.015, false),
-        ("krause-3hp", 0.089, false),
-        ("krause-3hp", 0.089, true),
-        ("spindle-2kw2", 0.0006, true),
+    for (name, inertia, coupled_hz) in [
+        ("motulator-2kw2", 0.015, None),
+        ("krause-3hp", 0.089, None),
+        ("spindle-2kw2", 0.0006, Some(30.0)),
     ] {
         let mut config = Config::of_motor(Some(name)).unwrap();
         config.load.mode = LoadMode::Free;
         config.shaft.static_nm = 0.03 * config.rated_nm();
         config.prepare.learn = true;
         assert!((config.motor.inertia / inertia - 1.0).abs() < 0.05, "{name}");
-        if coupled {
-            let (half, omega) = (0.5 * config.motor.inertia, 30.0 * std::f64::consts::TAU);
+        let coupled = coupled_hz.is_some();
+        if let Some(hz) = coupled_hz {
+            let (half, omega) = (0.5 * config.motor.inertia, hz * std::f64::consts::TAU);
             (config.motor.inertia, config.shaft.load_inertia) = (half, half);
             // The resonance of two equal inertias, with a damping ratio of 0.7 %.
             config.shaft.stiffness = 0.5 * half * omega * omega;

@@ -246,7 +246,7 @@ impl<L: AngleLoop> Coefficients<L> {
     fn measure_drop(&self, s: &mut Field<L::State>, elapsed: u32, sample: &DropSample) {
         if let Some(ratio) = self.inverter_drop.step(&mut s.inverter_drop, elapsed, sample) {
             s.observer.resistance.take(ratio - 1.0);
-            s.estimator.filter.start(s.observer.resistance.deviation);
+            self.reset_filter(s);
         }
     }
 

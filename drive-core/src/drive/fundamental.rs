@@ -41,14 +41,25 @@ impl<L: AngleLoop> Coefficients<L> {
                 || self.observer.as_ref().is_none_or(|observer| observer.has_flux(&s.observer)))
     }
 
+    /// Weighs the speed of the observer for the angle filter.
+    pub(super) fn weigh_speed(&self, s: &mut Field<L::State>, step: &StepResults) {
+        let Some(observer) = &self.observer else { return };
+        let seen = observer.weights(&s.observer, step.rotor_freq);
+        self.estimator.run(&mut s.estimator, |filter, state, _| filter.weigh_speed(state, &seen));
+    }
+
     /// Passes the speed that the observer has estimated in the injection period to the angle filter.
     pub(super) fn see_speed(&self, s: &mut Field<L::State>, step: &StepResults) {
         let Some(observer) = &self.observer else { return };
         // If the resistance does not follow the filter, neither does the speed.
         let shows = step.trust.resistance && step.trust.source == Source::Both;
         if shows && observer.has_flux(&s.observer) {
-            let seen = observer.seen_speed(&s.observer, s.hand_over.mean_turn(), step.flux_freq);
-            self.estimator.see_speed(&mut s.estimator, &seen);
+            let (seen, age) = observer.seen_speed(&s.observer, s.hand_over.mean_turn());
+            self.estimator.run(&mut s.estimator, |filter, state, axis| {
+                // This is the tracked speed at the time of the observed speed.
+                let tracked = axis.rotor_freq - axis.acceleration * age;
+                filter.see_speed(state, seen - tracked);
+            });
         }
     }
 
@@ -56,13 +67,19 @@ impl<L: AngleLoop> Coefficients<L> {
     pub(super) fn correct_angle(&self, s: &mut Field<L::State>, step: &StepResults) {
         let filters = self.filter_tracks(s, step);
         if !filters {
-            s.estimator.filter.start(s.observer.resistance.deviation);
+            self.reset_filter(s);
         }
         let known = self.freq_per_speed * s.motion.acceleration;
         let resistance = self.estimator.update_correction(&mut s.estimator, filters, known);
         if self.observer.is_some() && filters && step.trust.resistance {
             s.observer.resistance.correct(resistance);
         }
+    }
+
+    /// Resets the angle filter.
+    pub(super) fn reset_filter(&self, s: &mut Field<L::State>) {
+        let deviation = s.observer.resistance.deviation;
+        self.estimator.run(&mut s.estimator, |filter, state, _| filter.start(state, deviation));
     }
 
     /// Decides which source gives the angle.

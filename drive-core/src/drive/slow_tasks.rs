@@ -3,16 +3,16 @@
 //!
 //! | sample | task | needs before it |
 //! |---|---|---|
-//! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux; telemetry | averages (9) |
+//! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux; telemetry; covariance of the filter after the speed; voltage left for the injection | averages, speed (9) |
 //! | 1 | torque limit by the dc link; loss minimisation; voltages for the prediction at 3; lock monitor | saliency (0) |
-//! | 2 | rotor voltage for the prediction at 3; every sixth time the thermal loads; covariance of the filter after the speed (9) | magnetising current (0) |
-//! | 3 | voltage left for the injection; current limits by the voltage; judgement of the prediction | voltages (1), rotor voltage (2) |
-//! | 4 | injection signal for the filter, corrections of the tracked angle | saliency (0), covariance (2) |
-//! | 5 | reference current of the saliency; covariance of the filter after the injection (4); slow axes; travel of the sensors | - |
-//! | 6 | gains of the observer; injection current in both channels; voltages for the prediction at 8 | sums (9) |
-//! | 7 | rotor voltage for the prediction at 8; prediction of the filter | magnetising current (0) |
-//! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
-//! | 9 | averages of the demodulation; restart of the sums; speed for the filter | ten samples mixed, ten turns summed |
+//! | 2 | rotor voltage for the prediction at 3; every sixth time the thermal loads | magnetising current (0) |
+//! | 3 | current limits by the voltage; judgement of the prediction | voltages (1), rotor voltage (2) |
+//! | 4 | injection signal for the filter, corrections of the tracked angle | saliency (0), speed (9) |
+//! | 5 | reference current of the saliency; covariance of the filter after the angles, or its prediction (first part); slow axes | angle (4) |
+//! | 6 | gains of the observer; prediction of the filter (second part); voltages for the prediction at 8 | sums (9) |
+//! | 7 | weights of the speed for the filter; rotor voltage for the prediction at 8 | magnetising current (0), gains (6) |
+//! | 8 | over-speed; judgement of the prediction; travel of the sensors | voltages (6), rotor voltage (7) |
+//! | 9 | averages of the demodulation; restart of the sums; speed for the filter; injection current in both channels | ten samples mixed, ten turns summed, weights (7) |
 //!
 //! The noise watch takes its six readings in samples 0 to 2 (channel a) and 7 to 9 (channel b), three
 //! consecutive samples each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), so that it is
@@ -74,6 +74,8 @@ impl<L: AngleLoop> Coefficients<L> {
                     k.rotor_count = s.count_by_flux();
                 }
                 self.show(s, k);
+                s.estimator.filter.reduce();
+                self.check_carrier_headroom(s, step)?;
                 self.watch_noise(s, 0, step.measured)
             }
             1 => {
@@ -90,11 +92,9 @@ impl<L: AngleLoop> Coefficients<L> {
                     self.load(k, step.measured, true)?;
                 }
                 self.predict(s, step);
-                s.estimator.filter.reduce();
                 self.watch_noise(s, 2, step.measured)
             }
             3 => {
-                self.check_carrier_headroom(s, step)?;
                 self.limit_voltage(s, k, step);
                 self.judge(s, step)
             }
@@ -107,21 +107,23 @@ impl<L: AngleLoop> Coefficients<L> {
                 // unambiguous.
                 s.count_by_flux();
                 s.estimator.synchronous.average_reference(step.reference.q);
-                s.estimator.filter.reduce();
+                self.estimator.run(&mut s.estimator, |filter, state, _| filter.turn(state));
                 self.hand_over(s, step);
                 let silent = s.hand_over.is_carrier_off();
                 self.turn(&mut s.axes, step.flux_freq, k.references.injection_axis, silent);
-                self.watch_travel(s, step)
+                Ok(())
             }
             6 => {
-                self.estimator.predict_flux(&mut s.estimator);
                 self.update_observer(s, step);
+                let decay = s.observer.resistance.decay;
+                self.estimator
+                    .run(&mut s.estimator, |filter, state, _| filter.predict(state, decay));
                 s.prediction.latch_voltage();
-                self.check_both_channels(s, step)
+                Ok(())
             }
             7 => {
-                let decay = s.observer.resistance.decay;
-                self.estimator.predict(&mut s.estimator, step.reference.q, decay);
+                s.estimator.filter.follow(step.reference.q, s.indirect.slip_freq);
+                self.weigh_speed(s, step);
                 self.predict(s, step);
                 self.watch_noise(s, 3, step.measured)
             }
@@ -130,11 +132,13 @@ impl<L: AngleLoop> Coefficients<L> {
                     return Err(Fault::OverSpeed);
                 }
                 self.judge(s, step)?;
+                self.watch_travel(s, step)?;
                 self.watch_noise(s, 4, step.measured)
             }
             _ => {
                 s.estimator.synchronous.average();
                 self.see_speed(s, step);
+                self.check_both_channels(s, step)?;
                 self.watch_noise(s, 5, step.measured)
             }
         }

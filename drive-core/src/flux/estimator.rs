@@ -11,7 +11,6 @@ use crate::carrier::{Asymmetry, CarrierSample, Saliency};
 use crate::flux::angle_filter::{AngleFilter, AngleFilterState, Correction};
 use crate::flux::hand_over::Turning;
 use crate::flux::indirect::FluxAngle;
-use crate::flux::observer::SeenSpeed;
 use crate::flux::printed_settings::PrintedSettings;
 use crate::flux::schedule::GainSchedule;
 use crate::flux::tracker::Axis;
@@ -183,28 +182,14 @@ impl<L: AngleLoop> Estimator<L> {
         }
     }
 
-    /// Begins an injection period of the filter, see [`AngleFilter`].
-    pub fn predict_flux(&self, state: &mut State<L>) {
+    /// Runs a part of an injection period of the filter, if the loop has one.
+    pub fn run(
+        &self,
+        state: &mut State<L>,
+        part: impl FnOnce(&AngleFilter, &mut AngleFilterState, &Axis),
+    ) {
         if let Some(FilterLoop { filter, .. }) = self.angle_loop.filter() {
-            filter.predict_flux(&mut state.filter, state.axis.rotor_freq);
-        }
-    }
-
-    /// Continues the injection period of the filter, with a q-axis current reference `i_q`, A, and the share of a deviation of the stator
-    /// resistance that decays in an injection period.
-    pub fn predict(&self, state: &mut State<L>, i_q: f32, resistance_decay: f32) {
-        state.filter.follow(i_q);
-        if let Some(FilterLoop { filter, .. }) = self.angle_loop.filter() {
-            filter.predict(&mut state.filter, resistance_decay);
-        }
-    }
-
-    /// Takes the speed that the observer has `seen` in the injection period.
-    pub fn see_speed(&self, state: &mut State<L>, seen: &SeenSpeed) {
-        if let Some(FilterLoop { filter, .. }) = self.angle_loop.filter() {
-            // This is the tracked speed at the time of the observed speed.
-            let tracked = state.axis.rotor_freq - state.axis.acceleration * seen.age;
-            filter.see_speed(&mut state.filter, seen, seen.rotor_freq - tracked);
+            part(filter, &mut state.filter, &state.axis);
         }
     }
 

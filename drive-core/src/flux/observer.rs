@@ -156,18 +156,18 @@ pub struct Leakage {
     pub slope: f32,
 }
 
-/// Speed of the rotor that the observer sees. With an angle error e and a relative deviation r of the resistance, it is true
-/// speed + `per_angle` e + `per_resistance` r.
+/// Weights of the errors in the speed that the observer sees. With an angle error e, a relative deviation r of the resistance, and a flux
+/// that is longer than estimated by the share d, which decays by `delta`, that speed is the true one
+/// + `per_angle` e + `per_resistance` r + (`speed` + `pull` delta) d.
 #[derive(Clone, Copy, Debug)]
-pub struct SeenSpeed {
-    /// Mean speed of an injection period, electrical turns per period.
-    pub rotor_freq: f32,
-    /// Age of that mean, samples.
-    pub age: f32,
-    /// `g w_r w_s`, rad/s per rad: the pull towards the flux of the observer's current model.
+pub struct SpeedWeights {
+    /// `g w_r^2 - alpha`, rad/s per rad: the pull towards the flux of the observer's current model, less the rotor's own.
     pub per_angle: f32,
     /// `r_s (i_q - g w_r i_d)/psi`, rad/s.
     pub per_resistance: f32,
+    /// `w_r`, rad/s, and `g w_r`.
+    pub speed: f32,
+    pub pull: f32,
 }
 
 /// Voltage that flux and leakage induce, for the feed-forward of the current loop.
@@ -338,15 +338,21 @@ impl Observer {
         state.flux > LEAST_FLUX_SHARE * self.nominal
     }
 
-    /// Returns the observed speed of the rotor, for a mean `turn` of the flux in an injection period, less the present slip, at a
-    /// flux of `flux_freq`, both in electrical turns per period.
-    pub fn seen_speed(&self, state: &ObserverState, turn: f32, flux_freq: f32) -> SeenSpeed {
+    /// Returns the observed speed of the rotor and its age, samples, for a mean `turn` of the flux in an injection period, both in
+    /// electrical turns per period.
+    pub fn seen_speed(&self, state: &ObserverState, turn: f32) -> (f32, f32) {
+        (turn - state.slip * (1.0 / TAU), self.age + SEEN_AGE)
+    }
+
+    /// Returns what else is in that speed, at a speed `rotor_freq` of the rotor, electrical turns per period.
+    pub fn weights(&self, state: &ObserverState, rotor_freq: f32) -> SpeedWeights {
+        let speed = rotor_freq * (TAU / PERIOD_S);
         let current = state.current.q - state.gain.q * state.current.d;
-        SeenSpeed {
-            rotor_freq: turn - state.slip * (1.0 / TAU),
-            age: self.age + SEEN_AGE,
-            per_angle: state.gain.q * flux_freq * (TAU / PERIOD_S),
+        SpeedWeights {
+            per_angle: state.gain.q * speed - self.rate * (1.0 / PERIOD_S),
             per_resistance: self.r_s * (1.0 / PERIOD_S) * current / state.flux,
+            speed,
+            pull: state.gain.q,
         }
     }
 
@@ -452,52 +458,67 @@ mod tests {
         }
     }
 
-    /// Runs the observer in a frame that is `e` behind the flux, with a resistance that is `r` higher than estimated. Returns the
-    /// observed speed of a flux that rotates steadily, rad/s. The current is regulated, so it is the same in the frame with any error.
-    fn seen_turn(stator: f32, rotor: f32, (e, r): (f32, f32), current: Dq) -> (f32, SeenSpeed) {
+    /// Runs the observer in a frame that is `e` behind a flux which is longer by the share `d`, with a resistance that is `r` higher than
+    /// estimated. Returns the observed speed of the rotor above the true one, rad/s. The current is regulated, so it is the same in the
+    /// frame with any error; the flux changes by the rotor equation.
+    fn seen_beyond(stator: f32, (e, r, d): (f32, f32, f32), current: Dq) -> (f32, SpeedWeights) {
         let motor = Motor::default();
         let leakage = Leakage { flux_saliency: 0.0, current_saliency: 0.0, share: 1.0, slope: 0.0 };
         let observer = Observer::new(&motor, &leakage, 1.4, 0.0);
-        let (mut state, psi) = (ObserverState::default(), motor.coupled_inductance() * current.d);
+        let (mut state, alpha) = (ObserverState::default(), 1.0 / motor.tau_r());
+        let psi = motor.coupled_inductance() * current.d;
         state.start(Some(&observer));
         state.flux = psi;
+        let rotor = stator - alpha * current.q / current.d;
         let angle = |n: i32| {
             let turns = f64::from(stator) * f64::from(n) * f64::from(PERIOD_S) / f64::from(TAU);
             crate::Angle::from_turns((turns % 1.0) as f32)
         };
-        let frame = |n: i32| (angle(n) - crate::Angle::from_radians(e)).unit_vector();
+        let frame = |n: i32| angle(n).unit_vector();
         state.last = current.to_alpha_beta(frame(0));
         observer.update(&mut state, rotor * PERIOD_S / TAU);
+        let grown = psi * (1.0 + d);
+        let mut flux = Dq { d: grown * libm::cosf(e), q: grown * libm::sinf(e) };
         for n in 0..2 {
             let [before, after] = [n, n + 1].map(|n| current.to_alpha_beta(frame(n)));
-            let [flux, next] =
-                [n, n + 1].map(|n| Dq { d: psi, q: 0.0 }.to_alpha_beta(angle(n).unit_vector()));
+            let (driven, slip) = (motor.coupled_inductance() * alpha, stator - rotor);
+            let next = Dq {
+                d: flux.d + PERIOD_S * (driven * current.d - alpha * flux.d + slip * flux.q),
+                q: flux.q + PERIOD_S * (driven * current.q - alpha * flux.q - slip * flux.d),
+            };
+            let turned = next.to_alpha_beta(frame(n + 1)) - flux.to_alpha_beta(frame(n));
             let drop = (before + after) * (0.5 * PERIOD_S * motor.r_s * (1.0 + r));
-            let volt_seconds = drop + (after - before) * motor.sigma_l_s() + (next - flux);
-            state.put_out(volt_seconds * (1.0 / PERIOD_S));
+            state
+                .put_out((drop + (after - before) * motor.sigma_l_s() + turned) * (1.0 / PERIOD_S));
             state.put_out(AlphaBeta::ZERO);
+            // The length in the observer is that of the current model.
+            state.flux = psi;
             observer.step(&mut state, after, frame(n), false);
+            flux = next;
         }
-        let freq = stator * PERIOD_S / TAU;
-        (state.turned / PERIOD_S, observer.seen_speed(&state, 0.0, freq))
+        let seen = (state.turned - state.slip) / PERIOD_S - rotor;
+        (seen, observer.weights(&state, rotor * PERIOD_S / TAU))
     }
 
-    /// Compares size and sign of the effects of an angle error and of the resistance, as the filter assumes them, with finite
-    /// differences of a machine.
+    /// Compares size and sign of the effects of an angle error, of the resistance and of a longer flux, as the filter assumes them, with
+    /// finite differences of a machine.
     #[test]
-    fn the_seen_speed_depends_on_angle_and_resistance_as_the_filter_takes_it() {
+    fn the_seen_speed_has_the_weights_that_the_filter_takes() {
         for stator in [-80.0, -20.0, 10.0, 60.0] {
             for i_q in [-2.0, 0.5, 2.5] {
-                let (current, rotor) = (Dq { d: 1.4, q: i_q }, stator - 4.0 * i_q);
-                let at = |error| seen_turn(stator, rotor, error, current);
-                let (_, model) = at((0.0, 0.0));
+                let at = |error| seen_beyond(stator, error, Dq { d: 1.4, q: i_q });
+                let (_, model) = at((0.0, 0.0, 0.0));
                 let slope = |ahead, behind, by: f32| (at(ahead).0 - at(behind).0) / (2.0 * by);
-                let by_angle = slope((0.02, 0.0), (-0.02, 0.0), 0.02);
-                let by_resistance = slope((0.0, 0.05), (0.0, -0.05), 0.05);
+                let by_angle = slope((0.02, 0.0, 0.0), (-0.02, 0.0, 0.0), 0.02);
+                let by_resistance = slope((0.0, 0.05, 0.0), (0.0, -0.05, 0.0), 0.05);
+                let by_growth = slope((0.0, 0.0, 0.02), (0.0, 0.0, -0.02), 0.02);
                 let close =
                     |found: f32, model: f32| (found - model).abs() < 0.03 * model.abs() + 0.5;
                 assert!(close(by_angle, model.per_angle), "{by_angle} {model:?}");
                 assert!(close(by_resistance, model.per_resistance), "{by_resistance} {model:?}");
+                let alpha = 1.0 / Motor::default().tau_r();
+                let growth = model.speed + model.pull * alpha;
+                assert!(close(by_growth, growth), "{by_growth} {model:?}");
             }
         }
     }

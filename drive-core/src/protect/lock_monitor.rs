@@ -124,6 +124,7 @@ impl LockMonitor {
     }
 
     /// Takes an accepted result of a self-commissioning.
+    #[cold] // in the flash
     pub fn take(&mut self, learned: &Learned) {
         if let (Some(carrier), Some(slope)) = (&learned.carrier, &learned.slope) {
             (self.grid, self.inverse_square) = (carrier.grid(), Self::inverse_square(carrier));

@@ -376,7 +376,7 @@ mod tests {
             let (seed, mut record) = (seed_of(64001, number), Record::default());
             let refused = qualify(&mut drawn(seed), seed, &mut record).unwrap();
             assert!(refused.is_none(), "{number}: {refused:?}");
-            assert!(record.is_good(), "{number}: {}", record.rms());
+            assert!(record.rms() < 2.5, "{number}: {}", record.rms());
         }
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::common::pair::Pair;
 use anyhow::Result;
-use drive_core::State;
+use drive_core::{Hardware, State};
 use hil_sim::{Config, config::LoadMode};
 use virtual_board::{Image, Options, Period};
 
@@ -47,7 +47,9 @@ struct Record {
 impl Record {
     fn take(&mut self, period: &Period) {
         let s = &period.sample;
-        assert!(s.hardware.is_empty(), "a hardware event in interrupt {}", self.interrupts);
+        // The self-test of the break raises its event before a start. The replay does without: its drive is not stopped by it.
+        let (events, interrupt) = (s.hardware, self.interrupts);
+        assert!(Hardware::BREAK.contains(events), "{events:?} in interrupt {interrupt}");
         for code in [s.current_a, s.current_b, s.dc_link, s.heat_sink] {
             self.samples.extend(code.to_le_bytes());
         }

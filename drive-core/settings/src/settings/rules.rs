@@ -168,9 +168,14 @@ impl Settings {
     /// current limit, so that a shaft that stands is left to the injection under any torque. Up to 40 Hz the sixth harmonic of the
     /// dead time stays below half of the injection frequency until the injection is switched off.
     pub(crate) fn observer_leads_hz(&self) -> f32 {
+        (OBSERVER_LEADS_OF_SLIP / TAU * self.largest_slip())
+            .clamp(OBSERVER_LEADS_HZ.0, OBSERVER_LEADS_HZ.1)
+    }
+
+    /// Returns the slip at the current limit, rad/s.
+    pub(crate) fn largest_slip(&self) -> f32 {
         let i_d = self.i_d();
-        let slip_hz = remaining_a(i_d, self.current_limit_a()) / (TAU * self.motor.tau_r() * i_d);
-        (OBSERVER_LEADS_OF_SLIP * slip_hz).clamp(OBSERVER_LEADS_HZ.0, OBSERVER_LEADS_HZ.1)
+        remaining_a(i_d, self.current_limit_a()) / (self.motor.tau_r() * i_d)
     }
 }
 
