@@ -9,7 +9,9 @@ pub(crate) mod synchronous;
 
 pub use asymmetry::Asymmetry;
 pub use at_start::AtStart;
-pub use injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN, CarrierPeriod, Injection};
+pub use injection::{
+    CARRIER_COS, CARRIER_S, CARRIER_SAMPLES, CARRIER_SIN, CarrierPeriod, Injection,
+};
 pub use kind::DemodulatorKind;
 pub use sample::CarrierSample;
 pub(crate) use sample::{CarrierCurrent, Saliency};

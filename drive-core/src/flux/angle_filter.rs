@@ -11,16 +11,16 @@
 //! ```
 //!
 //! `e` is the angle error, flux less estimate, rad; `w` the error of the tracked electrical speed of the rotor, rad/s; `a` that of its
-//! rate; `r` the relative deviation of the stator resistance; `b` another slow error of the observed speed, rad/s; `d` the share by
-//! which the flux is longer than estimated.
+//! rate; `r` the relative deviation of the stator resistance; `b` another slow error of the observed speed, rad/s; `d` the
+//! relative error of the length of the flux, flux less estimate.
 //!
 //! `e` and `d` follow from the rotor equation in a frame whose currents are regulated, with `alpha = 1/tau_r` and the slip
 //! `s = alpha i_q/i_d`, linearised: `psi' = R_R i - (alpha + j (w_s - w_r)) psi` with `psi = psi_0 (1 + d) (1 + j e)`. A change of the
 //! length decays by `delta`, which is larger than alpha by the ratio of the chord inductance to the incremental one: iron that saturates
-//! lets the flux grow less. In `z2` the
-//! voltage turns a flux that is longer by `d` faster by the same share, and the pull of the observer towards its current model, with the
-//! gain `g`, adds the rest; `h` comes from the [observer](super::observer::SpeedWeights). (A filter with `e' = w` alone, whose `b` took up the effect of the flux, lost motors that
-//! cross zero frequency while they generate, where `i_q/i_d` is above 2.)
+//! lets the flux grow less. In `z2`, a longer flux induces more voltage, which is observed as a higher speed; the pull of the observer
+//! towards its current model, with the gain `g`, adds the rest; `h` comes from the [observer](super::observer::SpeedWeights). (A filter
+//! with `e' = w` alone, whose `b` took up the effect of the flux, lost motors that cross zero frequency while they generate, where
+//! `i_q/i_d` is above 2.)
 //!
 //! `r` returns to the resistance that the start has measured with the time constant `tau_s`, 5 s; if none was measured, it does not
 //! return. While the q-axis current changes, the angle from the injection has an error (the saliency offset lags), and so has the speed
@@ -34,10 +34,11 @@
 //!
 //! Every injection period both measurements correct the state. Behind each speed the covariance is reduced, and a speed therefore has the
 //! gain of a Kalman filter. To save time, the covariance is predicted once in two injection periods, and in the other one it is reduced by
-//! both angles together. Until then an angle has the gain `P h'/(variance (1 + h P h' sum))` with the sum of the information `1/variance`,
-//! which is the gain that a reduction behind each angle would give. (When the speeds were taken together as well, and weighed before the
-//! prediction, their gain was a third of the right one after a load step.) The work is done in parts, in several samples, so that none
-//! takes long. They run from the flash (`memory.x`) and are not inlined, except the reduction.
+//! both angles together. Until then the gain of an angle is `P h'/(variance (1 + h P h' sum))`, with the sum of the information
+//! `1/variance`. A reduction behind each angle would give the same gain. (An earlier form reduced the covariance by two speeds together
+//! and weighed them before the prediction: after a load step the gain of a speed was a third of the right one.) The work is done in
+//! parts, in several samples, so that none takes long. They run from the flash (`memory.x`) and are not inlined there, because inlined
+//! they would lie in the control memory.
 //!
 //! Without an observer there is z1 alone, and the rotor equation is left out. With a steady covariance, the filter is then a
 //! loop of third order with Butterworth poles at `w_n = (rate noise/(variance of z1 x T))^(1/6)`.

@@ -64,7 +64,7 @@ impl Covariance {
     }
 
     /// Reduces the covariance by the `information` of measurements with these weights, `P -= P h' h P/(1/information + h P h')`.
-    #[inline(never)]
+    #[inline(never)] // in the control memory once for two calls: 470 bytes, and 240 cycles less than from the flash
     pub fn reduce(&mut self, weights: &Weights, information: f32) {
         let share = information / (1.0 + weights.explained * information);
         let mut covariance = self.0.iter_mut();

@@ -157,8 +157,8 @@ pub struct Leakage {
 }
 
 /// Weights of the errors in the speed that the observer sees. With an angle error e, a relative deviation r of the resistance, and a flux
-/// that is longer than estimated by the share d, which decays by `delta`, that speed is the true one
-/// + `per_angle` e + `per_resistance` r + (`speed` + `pull` delta) d.
+/// that is longer than estimated by the share d, which decays by `delta`, that speed exceeds the true one by `per_angle` e +
+/// `per_resistance` r + (`speed` + `pull` delta) d.
 #[derive(Clone, Copy, Debug)]
 pub struct SpeedWeights {
     /// `g w_r^2 - alpha`, rad/s per rad: the pull towards the flux of the observer's current model, less the rotor's own.

@@ -113,23 +113,23 @@ const REST: u8 = 12;
 const ALLOWANCE: (u8, u8, u8) = (3, 2, 72);
 
 impl LockMonitor {
-    /// Returns [`per_change`](Self::per_change) of a saliency sensitivity.
-    pub fn per_change(slope: &SlopeTable, sign: f32) -> [f32; POINTS] {
-        slope.inverses(MOST_UNIT).map(|inverse| -sign * inverse)
-    }
-
-    /// Returns [`inverse_square`](Self::inverse_square) of the injection current over i_q.
-    pub fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
-        table.points().map(|r| 1.0 / (r * r))
+    /// Returns `grid`, `inverse_square`, `per_change` and `is_positive` of an injection current over i_q and of a saliency sensitivity.
+    pub fn tables(
+        carrier: &CarrierTable,
+        slope: &SlopeTable,
+        sign: f32,
+    ) -> (Grid, [f32; POINTS], [f32; POINTS], bool) {
+        let inverse_square = carrier.points().map(|r| 1.0 / (r * r));
+        let per_change = slope.inverses(MOST_UNIT).map(|inverse| -sign * inverse);
+        (carrier.grid(), inverse_square, per_change, slope.at_rest() > 0.0)
     }
 
     /// Takes an accepted result of a self-commissioning.
     #[cold] // in the flash
     pub fn take(&mut self, learned: &Learned) {
         if let (Some(carrier), Some(slope)) = (&learned.carrier, &learned.slope) {
-            (self.grid, self.inverse_square) = (carrier.grid(), Self::inverse_square(carrier));
-            (self.per_change, self.is_positive) =
-                (Self::per_change(slope, self.sign), slope.at_rest() > 0.0);
+            (self.grid, self.inverse_square, self.per_change, self.is_positive) =
+                Self::tables(carrier, slope, self.sign);
         }
     }
 

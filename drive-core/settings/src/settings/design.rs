@@ -8,10 +8,9 @@ mod scalar;
 
 use core::f32::consts::TAU;
 
-use self::estimator::CARRIER_S;
 use crate::settings::{CurrentSensors, InjectionAxis, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, MotionDesign, SpeedSource, TuningError};
-use drive_core::carrier::{AtStart, Injection};
+use drive_core::carrier::{AtStart, CARRIER_S, Injection};
 use drive_core::current::{DeadTime, DqPi, InverterDrop, Modulator, Pi, VoltageLimit};
 use drive_core::flux::{AngleLoop, Indirect, Leakage, Observer};
 use drive_core::printed::DemodulatorKind;
@@ -222,15 +221,17 @@ impl Settings {
     /// Returns the lock monitor; `carrier_a` is the expected injection current along the injection axis, A peak.
     fn lock_monitor(&self, carrier_a: f32) -> LockMonitor {
         let (t, sign) = (&self.injection.synchronous, self.injection.axis.sign());
-        let (carrier, slope, least) = (self.carrier(), self.slope(), LEAST_CARRIER * carrier_a);
+        let (grid, inverse_square, per_change, is_positive) =
+            LockMonitor::tables(&self.carrier(), &self.slope(), sign);
+        let least = LEAST_CARRIER * carrier_a;
         LockMonitor {
-            grid: carrier.grid(),
-            inverse_square: LockMonitor::inverse_square(&carrier),
-            per_change: LockMonitor::per_change(&slope, sign),
+            grid,
+            inverse_square,
+            per_change,
             sign,
             smoothing: CARRIER_S / (t.deficit_s + CARRIER_S),
             allowed: t.allowed_deficit,
-            is_positive: slope.at_rest() > 0.0,
+            is_positive,
             moved: self.share_of_rated(MOVED_A),
             least: least * least,
         }

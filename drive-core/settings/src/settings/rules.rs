@@ -185,6 +185,11 @@ impl Nameplate {
         self.power_w / (self.speed_rpm * TAU / 60.0)
     }
 
+    /// Returns the rated flux, Vs peak: the voltage of a phase over the rated frequency.
+    pub(crate) fn flux(&self) -> f32 {
+        self.voltage_v * PEAK_OF_PHASE / (TAU * self.frequency_hz)
+    }
+
     /// Returns the base impedance of a phase, ohm.
     pub fn base_impedance(&self) -> f32 {
         self.voltage_v / (SQRT_3 * self.current_a)
@@ -223,9 +228,7 @@ impl Settings {
     /// largest torque at the rated current and at the limit. Torque is proportional to i_d i_q, which is largest if both are
     /// equal.
     fn useful_i_d(&self, limit_a: f32) -> f32 {
-        let plate = &self.nameplate;
-        let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
-        f32::min(rated_flux / self.motor.l_m, self.largest_i_d(limit_a))
+        f32::min(self.nameplate.flux() / self.motor.l_m, self.largest_i_d(limit_a))
     }
 
     /// Returns the largest magnetising current with a current limit, A: the current of the largest torque at the rated current and

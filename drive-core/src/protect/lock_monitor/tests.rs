@@ -6,15 +6,16 @@ use super::*;
 /// flux. `sign`: 1 with the injection across the flux, -1 along it.
 fn monitor_of(a: f32, sign: f32) -> LockMonitor {
     let slope = SlopeTable::of_flux_saliency(Grid::REFERENCE, a);
-    let carrier = CarrierTable::default();
+    let (grid, inverse_square, per_change, is_positive) =
+        LockMonitor::tables(&CarrierTable::default(), &slope, sign);
     LockMonitor {
-        grid: Grid::REFERENCE,
-        inverse_square: LockMonitor::inverse_square(&carrier),
-        per_change: LockMonitor::per_change(&slope, sign),
+        grid,
+        inverse_square,
+        per_change,
         sign,
         smoothing: 1.0 / (1.0 + 600.0 * 0.12),
         allowed: 0.55,
-        is_positive: a > 0.0,
+        is_positive,
         moved: 0.03,
         least: 0.13 * 0.13,
     }

@@ -5,17 +5,15 @@ use core::f32::consts::{FRAC_1_SQRT_2, TAU};
 use num_complex::Complex64;
 
 use crate::settings::Settings;
-use drive_core::carrier::{Asymmetry, CARRIER_SAMPLES};
+use drive_core::FirstOrder;
+use drive_core::carrier::{Asymmetry, CARRIER_S, CARRIER_SAMPLES};
 use drive_core::flux::{AngleFilter, AngleLoop, Estimator, FilterLoop, GainSchedule};
 use drive_core::printed::PrintedSettings;
-use drive_core::{FirstOrder, PERIOD_S};
 
 /// Group delay of the band-pass at 600 Hz, samples, which is the lag of the envelope of the
 /// injection current.
 const BPF_GROUP_DELAY: f32 = 8.83;
 
-/// Injection period, s.
-pub(super) const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
 /// Noise of a current sensor with the dissertation's sensors, A.
 pub(super) const NOISE_A: f32 = 0.005;
 /// Standard deviation of the saliency relative to that noise over the injection current, with the correlation of the averages.
@@ -110,9 +108,7 @@ impl Settings {
         };
         let square = |x: f32| x * x;
         let alpha = if self.uses_observer() { 1.0 / m.tau_r() } else { 0.0 };
-        let rated =
-            libm::sqrtf(2.0 / 3.0) * self.nameplate.voltage_v / (TAU * self.nameplate.frequency_hz);
-        let y = SATURATED * libm::powf(flux / rated, KNEE);
+        let y = SATURATED * libm::powf(flux / self.nameplate.flux(), KNEE);
         let delta = alpha * (1.0 + (KNEE + 1.0) * y) / (1.0 + y);
         AngleFilter {
             rate: square(rate),
