@@ -95,7 +95,7 @@ pub struct AngleFilter {
     /// Shares of an error of the angle and of the length of the flux that the rotor equation keeps over [`SPAN_S`](Self::SPAN_S),
     /// `exp(-alpha SPAN_S)` and `exp(-delta SPAN_S)`; 1 without an observer.
     pub kept: [f32; 2],
-    /// Rate `delta` by which a change of the length of the flux decays, 1/s, at least alpha.
+    /// Rate `delta` by which a change of the length of the flux decays, 1/s, at least alpha; 0 without an observer.
     pub delta: f32,
     /// Variance of the slow error of the observed speed, (rad/s)^2, and the rate by which it decays, 1/s.
     pub slow: f32,
@@ -183,8 +183,8 @@ impl AngleFilter {
             let information = core::mem::take(&mut state.angles);
             return state.covariance.reduce(&state.weights, information);
         }
-        if self.kept == [1.0; 2] {
-            return;
+        if self.delta == 0.0 {
+            return; // without an observer
         }
         // The rotor equation: a rotation by two shears, which keep the area, then the decay.
         let (turn, p) = (PERIODS * state.slip, &mut state.covariance);

@@ -182,7 +182,9 @@ impl SignalChoice {
     /// Writes the values of the chosen signals, taken from those of all signals.
     pub fn record(&self, record: &mut Record, values: &Values) {
         for (place, signal) in record.iter_mut().zip(&self.signals) {
-            *place = values.get(usize::from(*signal)).copied().unwrap_or(0.0);
+            if let Some(value) = values.get(usize::from(*signal)) {
+                *place = *value;
+            }
         }
     }
 }
