@@ -282,7 +282,7 @@ enum FluxPhase {
 impl FluxPhase {
     #[inline(always)] // a constant would be copied with the memory that it shares
     pub fn ready() -> Self {
-        Self::Ready(TravelWatchState::NEW)
+        Self::Ready(TravelWatchState::default())
     }
 
     /// Whether the angle of the flux is known.

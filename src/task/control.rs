@@ -14,7 +14,7 @@ use cortex_m::asm;
 use cortex_m::peripheral::{DWT, NVIC};
 use drive_core::flux::FilterLoop;
 use drive_core::learned::Learned;
-use drive_core::{Command, Drive, FrontEndState, Hardware, Sample, State, Stop};
+use drive_core::{Command, Drive, FrontEndState, Hardware, Limiting, Sample, State, Stop};
 use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
 
@@ -217,11 +217,11 @@ impl Running {
             stage.pwm.trip();
             stage.pwm.disarm();
         }
-        let state = drive.state();
+        let (state, limiting) = (drive.state(), drive.limiting());
         // Both are never true.
         let told = OFF * u8::from(is_off) + STOPPING * u8::from(state.is_stopping());
         STAGE.store(told, Ordering::Relaxed);
-        let sampled = Sampled::new(&sample, state, drive.limiting());
+        let sampled = Sampled::new(&sample, state, limiting);
         let traced = trace.step(&sampled, drive.telemetry());
 
         self.unreported |= period.hardware;
@@ -261,12 +261,12 @@ impl Running {
         let worst = if commanded { with } else { without };
         *worst = cycles.max(*worst);
         if part == 1 {
-            self.report(state, sample, cycles);
+            self.report(state, limiting, sample, cycles);
         }
     }
 
     /// Reports to the main loop. If the main loop is slow or hangs, this report is lost, but not its events.
-    fn report(&mut self, state: State, sample: Sample, cycles: u32) {
+    fn report(&mut self, state: State, limiting: Limiting, sample: Sample, cycles: u32) {
         let Control { drive, stage, status, learned, .. } = &mut self.control;
         if self.reported == Some(State::Learning)
             && let Some(result) = drive.learned()
@@ -283,7 +283,7 @@ impl Running {
             report.worst_latency = self.worst_latency;
             report.hardware = self.unreported;
             report.learning = drive.learning_progress();
-            report.limiting = drive.limiting();
+            report.limiting = limiting;
             report.torque_limits = drive.torque_limits();
             report.stator_resistance = drive.stator_resistance();
             // The part for the commissioning does not change while the drive regulates.

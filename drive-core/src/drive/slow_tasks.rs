@@ -11,12 +11,12 @@
 //! | 5 | reference current of the saliency; covariance of the filter after the angles, or its prediction (first part); slow axes | angle (4) |
 //! | 6 | gains of the observer; prediction of the filter (second part); voltages for the prediction at 8 | sums (9) |
 //! | 7 | weights of the speed for the filter; rotor voltage for the prediction at 8 | magnetising current (0), gains (6) |
-//! | 8 | over-speed; judgement of the prediction; travel of the sensors | voltages (6), rotor voltage (7) |
+//! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
 //! | 9 | averages of the demodulation; restart of the sums; speed for the filter; injection current in both channels | ten samples mixed, ten turns summed, weights (7) |
 //!
-//! The noise watch takes its six readings in samples 0 to 2 (channel a) and 7 to 9 (channel b), three
-//! consecutive samples each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), so that it is
-//! as old as the averages of sample 9.
+//! The travel watch takes a reading in each sample, and the noise watch six: in samples 0 to 2 (channel a) and 7 to 9 (channel b),
+//! three consecutive samples each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), so that it is as old as the
+//! averages of sample 9.
 
 use super::trust::{Check, Lock, Trust};
 use super::{Common, Field, FluxPhase};
@@ -66,6 +66,9 @@ impl<L: AngleLoop> Coefficients<L> {
         index: usize,
         step: &StepResults,
     ) -> Result<(), Fault> {
+        if let FluxPhase::Ready(travel) = &mut s.flux {
+            self.travel_watch.step(travel, index, &step.measured.phases, step.flux_freq)?;
+        }
         match index {
             0 => {
                 self.estimator.update_saliency(&mut s.estimator, step.carrier_axis, step.flux_freq);
@@ -132,7 +135,6 @@ impl<L: AngleLoop> Coefficients<L> {
                     return Err(Fault::OverSpeed);
                 }
                 self.judge(s, step)?;
-                self.watch_travel(s, step)?;
                 self.watch_noise(s, 4, step.measured)
             }
             _ => {
@@ -154,15 +156,6 @@ impl<L: AngleLoop> Coefficients<L> {
         match &self.noise_watch {
             Some(watch) => watch.step(&mut s.noise, look, measured, s.hand_over.judges_noise()),
             None => Ok(()),
-        }
-    }
-
-    /// Checks that both sensors follow a rotating current while there is no injection.
-    fn watch_travel(&self, s: &mut Field<L::State>, step: &StepResults) -> Result<(), Fault> {
-        let freq = if self.injects(s) { 0.0 } else { step.flux_freq };
-        match &mut s.flux {
-            FluxPhase::Ready(state) => self.travel_watch.step(state, &step.measured.phases, freq),
-            _ => Ok(()),
         }
     }
 
