@@ -129,7 +129,7 @@ def test_a_refusal_of_the_drive_and_a_fault_are_told():
 
 def test_drive_and_plant_close_the_loop_in_python():
     """The torque of the encoder's field orientation is that of its currents: 3/2 P L_m/L_r psi i_q."""
-    config = drive.Config(set={"angle_source": "encoder", "inverter.dead_time_us": 0})
+    config = drive.Config(set={"angle_source": "encoder", "inverter.dead_time_s": 0})
     control, motor = drive.Drive(config), drive.Plant(config)
     motor.set_load("locked")
     control.command("start torque")
