@@ -3,7 +3,7 @@
 //!
 //! | sample | task | needs before it |
 //! |---|---|---|
-//! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux; telemetry; covariance of the filter after the speed; voltage left for the injection | averages, speed (9) |
+//! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux; telemetry; covariance of the filter after the speed; voltage left for the injection; turn of the current for the travel watch | averages, speed (9) |
 //! | 1 | torque limit by the dc link; loss minimisation; voltages for the prediction at 3; lock monitor | saliency (0) |
 //! | 2 | rotor voltage for the prediction at 3; every sixth time the thermal loads | magnetising current (0) |
 //! | 3 | current limits by the voltage; judgement of the prediction | voltages (1), rotor voltage (2) |
@@ -67,7 +67,7 @@ impl<L: AngleLoop> Coefficients<L> {
         step: &StepResults,
     ) -> Result<(), Fault> {
         if let FluxPhase::Ready(travel) = &mut s.flux {
-            self.travel_watch.step(travel, index, &step.measured.phases, step.flux_freq)?;
+            self.travel_watch.step(travel, index, &step.measured.phases)?;
         }
         match index {
             0 => {
@@ -78,7 +78,12 @@ impl<L: AngleLoop> Coefficients<L> {
                 }
                 self.show(s, k);
                 s.estimator.filter.reduce();
-                self.check_carrier_headroom(s, step)?;
+                if let FluxPhase::Ready(travel) = &mut s.flux {
+                    let change = (step.reference.d, s.estimator.filter.moved);
+                    let phases = &step.measured.phases;
+                    self.travel_watch.see_turn(travel, phases, step.flux_freq, change);
+                }
+                self.check_headroom(s, step)?;
                 self.watch_noise(s, 0, step.measured)
             }
             1 => {
@@ -140,7 +145,7 @@ impl<L: AngleLoop> Coefficients<L> {
             _ => {
                 s.estimator.synchronous.average();
                 self.see_speed(s, step);
-                self.check_both_channels(s, step)?;
+                self.check_channels(s, step)?;
                 self.watch_noise(s, 5, step.measured)
             }
         }
@@ -248,11 +253,7 @@ impl<L: AngleLoop> Coefficients<L> {
     }
 
     /// Checks that both current sensors see the injection current.
-    fn check_both_channels(
-        &self,
-        s: &mut Field<L::State>,
-        step: &StepResults,
-    ) -> Result<(), Fault> {
+    fn check_channels(&self, s: &mut Field<L::State>, step: &StepResults) -> Result<(), Fault> {
         if !self.injects(s) {
             return Ok(());
         }
@@ -262,11 +263,7 @@ impl<L: AngleLoop> Coefficients<L> {
     }
 
     /// Reduces the injection to the voltage that the fundamental leaves.
-    fn check_carrier_headroom(
-        &self,
-        s: &mut Field<L::State>,
-        step: &StepResults,
-    ) -> Result<(), Fault> {
+    fn check_headroom(&self, s: &mut Field<L::State>, step: &StepResults) -> Result<(), Fault> {
         if !self.inject || s.hand_over.is_carrier_off() {
             return Ok(());
         }

@@ -122,7 +122,7 @@ pub struct AngleFilterState {
     expected: f32,
     /// Q-axis current of the last injection period, and its largest recent change, A.
     i_q: f32,
-    moved: f32,
+    pub moved: f32,
     /// Slip, rad in an injection period.
     slip: f32,
 }

@@ -11,6 +11,8 @@
 //! channel in each sample, in turn. An open sensor shows noise. Its window is wider, and takes every other or third of these readings. The
 //! time until the fault was simulated on the dissertation's motor at 900, 1800 and 3000 rpm: `tests/silent_sensors.rs`.
 
+use core::f32::consts::TAU;
+
 use crate::carrier::CARRIER_SAMPLES;
 use crate::{Abc, AlphaBeta, Fault};
 
@@ -18,9 +20,11 @@ use crate::{Abc, AlphaBeta, Fault};
 const TURN: f32 = 6.0;
 /// Least current that is judged, relative to the `s` of the narrow window.
 const LEAST: f32 = 32.0;
-/// Half widths `s` of the windows, A on the reference board: one and a half readings of its converter, and six times its noise.
+/// Half width `s` of the narrow window, A on the reference board: one and a half readings of its converter.
 const STUCK_A: f32 = 0.0033;
-const OPEN_A: f32 = 0.03;
+/// Change of the torque current that is no change, relative to the d-axis current times the turn in the same time. Only above 1 can both
+/// act against each other.
+const STEADY: f32 = 0.5;
 
 /// A window and its readings.
 struct Window {
@@ -36,14 +40,16 @@ struct Window {
 }
 
 const STUCK: Window = Window { half: 1.0, every: 2, least: 4, largest: 20 };
-const OPEN: Window =
-    Window { half: OPEN_A / STUCK_A, every: CARRIER_SAMPLES / 2, least: 3, largest: 10 };
+// Six times the noise.
+const OPEN: Window = Window { half: 9.0, every: CARRIER_SAMPLES / 2, least: 3, largest: 10 };
 
 /// Coefficient of the watch.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TravelWatch {
     /// Half width of the narrow window, A.
     half_a: f32,
+    /// Reciprocal of its square, 1/A^2.
+    per_square: f32,
 }
 
 /// State of the watch.
@@ -69,11 +75,29 @@ struct Still {
 impl TravelWatch {
     /// Creates the watch for sensors whose range is `range` times that of the reference board.
     pub fn new(range: f32) -> Self {
-        Self { half_a: range * STUCK_A }
+        let half_a = range * STUCK_A;
+        Self { half_a, per_square: 1.0 / (half_a * half_a) }
     }
 
-    /// Reads the current of one channel in sample `index` of the injection period. `flux_freq` is the frequency of the flux, electrical
-    /// turns per control period.
+    /// Updates the pace; once an injection period. `flux_freq` is the frequency of the flux, electrical turns per control period; `d` the
+    /// d-axis current, A, and `moved` the largest recent change of the q-axis current in an injection period, A, both of the reference.
+    pub fn see_turn(
+        &self,
+        state: &mut TravelWatchState,
+        phases: &Abc,
+        flux_freq: f32,
+        (d, moved): (f32, f32),
+    ) {
+        const PER: f32 = 1.0 / sixth(TURN / TAU);
+        let current = AlphaBeta::from_two_phases(phases.a, phases.b);
+        let square = current.length_squared() * self.per_square;
+        let pace = if square > LEAST * LEAST { square * sixth(flux_freq) * PER } else { 0.0 };
+        let steady = moved < STEADY * TAU * CARRIER_SAMPLES as f32 * d * flux_freq.abs();
+        // A silent sensor soon disturbs frequency and current. Therefore the pace falls by at most a tenth.
+        state.pace = if steady { f32::max(pace, 0.9 * state.pace) } else { 0.0 };
+    }
+
+    /// Reads the current of one channel in sample `index` of the injection period.
     ///
     /// # Errors
     /// [`Fault::SensorSilentA`] or [`Fault::SensorSilentB`].
@@ -82,12 +106,8 @@ impl TravelWatch {
         state: &mut TravelWatchState,
         index: usize,
         phases: &Abc,
-        flux_freq: f32,
     ) -> Result<(), Fault> {
         let TravelWatchState { stuck, open, pace } = state;
-        if index == 0 {
-            *pace = self.pace(*pace, phases, flux_freq);
-        }
         let (n, now, fault) = match index % STUCK.every {
             0 => (0, phases.a, Fault::SensorSilentA),
             _ => (1, phases.b, Fault::SensorSilentB),
@@ -95,17 +115,6 @@ impl TravelWatch {
         fault.unless(self.follows(&mut stuck[n], now, *pace, &STUCK))?;
         let wide = matches!(index, 2 | 3 | 7 | 8);
         fault.unless(!wide || self.follows(&mut open[n], now, *pace, &OPEN))
-    }
-
-    /// Returns the pace in an injection period, from that of the last one.
-    fn pace(&self, last: f32, phases: &Abc, flux_freq: f32) -> f32 {
-        const LIMIT: f32 = sixth(TURN / core::f32::consts::TAU);
-        let square = AlphaBeta::from_two_phases(phases.a, phases.b).length_squared();
-        let of_half = square / (self.half_a * self.half_a);
-        let judged = of_half > LEAST * LEAST;
-        let pace = if judged { of_half * sixth(flux_freq) * (1.0 / LIMIT) } else { 0.0 };
-        // A silent sensor soon disturbs frequency and current. Therefore the pace falls by at most a tenth.
-        f32::max(pace, 0.9 * last)
     }
 
     /// Takes a reading, A, and returns whether the channel may follow the current.
@@ -155,7 +164,10 @@ mod tests {
             let phases = Abc::new(a, b, -(a + b));
             let index = n as usize % CARRIER_SAMPLES;
             let freq = (hz / RATE_HZ) as f32;
-            let fault = watch.step(&mut state, index, &phases, freq).err()?;
+            if index == 0 {
+                watch.see_turn(&mut state, &phases, freq, (1.4, 0.0));
+            }
+            let fault = watch.step(&mut state, index, &phases).err()?;
             Some((t - dead, fault))
         })
     }
