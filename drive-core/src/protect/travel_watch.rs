@@ -4,8 +4,9 @@
 //! a change of the torque and the turn act against each other. There the curve is flat to the third order, as `I theta^3/6` over the
 //! turn `theta`, and stays within `s` of a reading for at most `5.4 (s/I)^(1/3)`. A channel that stays there for [`TURN`]` (s/I)^(1/3)` is
 //! silent. No model and no voltage are involved, so no control action can hide the defect, and the rule holds for each motor and speed.
-//! (A d-axis current far below `I` and a change of torque that matches it allow more: of 162 000 simulated reversals at 30 to 400 Hz, with
-//! d-axis currents down to 0.13 of the q-axis one and a reading that moves by one unit at random, 23 stayed longer.)
+//!
+//! If the d-axis current is far below `I`, a reversal of the torque leads the current through a small amplitude, and it can stay longer.
+//! Therefore nothing is judged while the q-axis current has lately changed by more than [`STEADY`] of what the turn changes.
 //!
 //! There are two windows. A sensor that is stuck repeats its reading. The window of the smallest `s` detects it soonest; it takes one
 //! channel in each sample, in turn. An open sensor shows noise. Its window is wider, and takes every other or third of these readings. The
@@ -22,8 +23,8 @@ const TURN: f32 = 6.0;
 const LEAST: f32 = 32.0;
 /// Half width `s` of the narrow window, A on the reference board: one and a half readings of its converter.
 const STUCK_A: f32 = 0.0033;
-/// Change of the torque current that is no change, relative to the d-axis current times the turn in the same time. Only above 1 can both
-/// act against each other.
+/// Largest change of the q-axis current that counts as none, relative to the d-axis current times the turn in the same time. Only above 1
+/// can change and turn act against each other.
 const STEADY: f32 = 0.5;
 
 /// A window and its readings.
@@ -199,7 +200,7 @@ mod tests {
         }
     }
 
-    /// The torque current reverses at any rate, at any angle: somewhere a phase current is flat to the third order.
+    /// The q-axis current reverses at any rate, at any angle: somewhere a phase current is flat to the third order.
     #[test]
     fn a_reversal_is_not_silent_however_fast() {
         for (hz, from) in cases() {
