@@ -80,8 +80,7 @@ impl<L: AngleLoop> Coefficients<L> {
                 s.estimator.filter.reduce();
                 if let FluxPhase::Ready(travel) = &mut s.flux {
                     let change = (step.reference.d, s.estimator.filter.moved);
-                    let phases = &step.measured.phases;
-                    self.travel_watch.see_turn(travel, phases, step.flux_freq, change);
+                    self.travel_watch.see_turn(travel, step.current, step.flux_freq, change);
                 }
                 self.check_headroom(s, step)?;
                 self.watch_noise(s, 0, step.measured)

@@ -6,7 +6,7 @@
 //! silent. No model and no voltage are involved, so no control action can hide the defect, and the rule holds for each motor and speed.
 //!
 //! If the d-axis current is far below `I`, a reversal of the torque leads the current through a small amplitude, and it can stay longer.
-//! Therefore nothing is judged while the q-axis current has lately changed by more than [`STEADY`] of what the turn changes.
+//! Therefore the watch rests after a quick change of the q-axis current; [`STEADY`] is the limit.
 //!
 //! There are two windows. A sensor that is stuck repeats its reading. The window of the smallest `s` detects it soonest; it takes one
 //! channel in each sample, in turn. An open sensor shows noise. Its window is wider, and takes every other or third of these readings. The
@@ -20,7 +20,7 @@ use crate::{Abc, AlphaBeta, Fault};
 /// Turn of the current after which a channel is silent, rad for `s = I`.
 const TURN: f32 = 6.0;
 /// Least current that is judged, relative to the `s` of the narrow window.
-const LEAST: f32 = 32.0;
+const LEAST_CURRENT: f32 = 32.0;
 /// Half width `s` of the narrow window, A on the reference board: one and a half readings of its converter.
 const STUCK_A: f32 = 0.0033;
 /// Largest change of the q-axis current that counts as none, relative to the d-axis current times the turn in the same time. Only above 1
@@ -80,19 +80,19 @@ impl TravelWatch {
         Self { half_a, per_square: 1.0 / (half_a * half_a) }
     }
 
-    /// Updates the pace; once an injection period. `flux_freq` is the frequency of the flux, electrical turns per control period; `d` the
+    /// Updates the pace; once an injection period. `current` is the measured current, A; `flux_freq` is the frequency of the flux, electrical turns per control period; `d` the
     /// d-axis current, A, and `moved` the largest recent change of the q-axis current in an injection period, A, both of the reference.
     pub fn see_turn(
         &self,
         state: &mut TravelWatchState,
-        phases: &Abc,
+        current: AlphaBeta,
         flux_freq: f32,
         (d, moved): (f32, f32),
     ) {
         const PER: f32 = 1.0 / sixth(TURN / TAU);
-        let current = AlphaBeta::from_two_phases(phases.a, phases.b);
         let square = current.length_squared() * self.per_square;
-        let pace = if square > LEAST * LEAST { square * sixth(flux_freq) * PER } else { 0.0 };
+        let judged = square > LEAST_CURRENT * LEAST_CURRENT;
+        let pace = if judged { square * sixth(flux_freq) * PER } else { 0.0 };
         let steady = moved < STEADY * TAU * CARRIER_SAMPLES as f32 * d * flux_freq.abs();
         // A silent sensor soon disturbs frequency and current. Therefore the pace falls by at most a tenth.
         state.pace = if steady { f32::max(pace, 0.9 * state.pace) } else { 0.0 };
@@ -166,7 +166,8 @@ mod tests {
             let index = n as usize % CARRIER_SAMPLES;
             let freq = (hz / RATE_HZ) as f32;
             if index == 0 {
-                watch.see_turn(&mut state, &phases, freq, (1.4, 0.0));
+                let current = AlphaBeta::from_two_phases(phases.a, phases.b);
+                watch.see_turn(&mut state, current, freq, (1.4, 0.0));
             }
             let fault = watch.step(&mut state, index, &phases).err()?;
             Some((t - dead, fault))
