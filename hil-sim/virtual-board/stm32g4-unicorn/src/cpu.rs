@@ -59,12 +59,18 @@ pub struct Cpu<C: Circuit = ()> {
     faulted: Rc<Cell<Option<u32>>>,
     trapped: Rc<Cell<bool>>,
     guard: Option<guard::Guard>,
-    /// Number of the next blocks that may begin with the state of a finished IT block.
-    suspects: Rc<Cell<u8>>,
-    /// Set when a block has to begin again, see [`is_stale`].
-    again: Rc<Cell<bool>>,
+    suspects: Rc<Suspects>,
     /// The hook for reads from the code area of the flash.
     flash_reads: Option<UcHookId>,
+}
+
+/// Blocks and instructions that may begin with the state of a finished IT block.
+#[derive(Default)]
+struct Suspects {
+    /// Number of the next blocks, or instructions if the core can stop at each, that have to be looked at.
+    left: Cell<u8>,
+    /// Set when a block has to begin again.
+    again: Cell<bool>,
 }
 
 /// The state of the IT block in XPSR.
@@ -76,8 +82,8 @@ pub struct CoreState {
     memories: Vec<(u32, Vec<u8>)>,
 }
 
-/// Blocks after a stop of the core of which the first may lie in an IT block: its four instructions, and the one after it.
-const AFTER_STOP: u8 = 5;
+/// Largest number of suspects: after a stop or a look-up of a page in an IT block its four instructions, and the one after it.
+const SUSPECTS: u8 = 5;
 /// Size of the pieces, bytes, that are compared before they are written, because written code is translated again.
 const PIECE: usize = 256;
 /// Longest time between two operations of the flash, ticks: 100 ms.
@@ -129,11 +135,13 @@ impl<C: Circuit> Cpu<C> {
         )?;
 
         let end = u64::from(memory::RAM + memory::RAM_SIZE - 1);
+        let suspects = Rc::new(Suspects::default());
         // A single hook for all code, because the emulator asks each hook at every block whether the block is in its range.
         let from = if counting.every_instruction {
             let flash = (u64::from(memory::FLASH), u64::from(memory::STORED - 1));
-            uc.add_code_hook(flash.0, flash.1, |uc, address, size| {
-                if !fetched(uc, address as u32, size) {
+            let begun = Rc::clone(&suspects);
+            uc.add_code_hook(flash.0, flash.1, move |uc, address, size| {
+                if !begun.stops_at(uc, address as u32) && !fetched(uc, address as u32, size) {
                     uc.get_data_mut().instructions(1);
                 }
             })?;
@@ -146,19 +154,11 @@ impl<C: Circuit> Cpu<C> {
         let mut costs = Costs::new(memory::FLASH, flash_size, |instruction| instruction.cycles);
         let mut fast = Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
         let mut last = 0;
-        // The number of blocks of which the first instructions may be mistaken, and whether the begun block must begin again.
-        let (suspects, again) = (Rc::new(Cell::new(0_u8)), Rc::new(Cell::new(false)));
         let (looked_up, begun) = (Rc::clone(&suspects), Rc::clone(&suspects));
-        let stale = Rc::clone(&again);
         uc.add_block_hook(from.into(), end, move |uc, address, size| {
             let address = address as u32;
-            if let Some(left) = begun.get().checked_sub(1) {
-                begun.set(left);
-                if is_stale(uc, address) {
-                    stale.set(true);
-                    uc.emu_stop().ok();
-                    return;
-                }
+            if begun.stops_at(uc, address) {
+                return;
             }
             match address {
                 memory::FLASH..memory::STORED => {
@@ -213,12 +213,12 @@ impl<C: Circuit> Cpu<C> {
         }
         uc.ctl_tlb_type(TlbType::VIRTUAL)?;
         uc.add_tlb_hook(0, u64::MAX, move |_, paddr, access| {
-            looked_up.set(looked_up.get().max(1));
+            looked_up.left.set(SUSPECTS);
             let data = Permission::READ | Permission::WRITE;
             let perms = if access == MemType::FETCH { Permission::ALL } else { data };
             Some(TlbEntry { paddr, perms })
         })?;
-        Ok(Self { uc, faulted, trapped, suspects, again, guard: None, flash_reads: None })
+        Ok(Self { uc, faulted, trapped, suspects, guard: None, flash_reads: None })
     }
 
     /// Follows the flash: data reads from the code area are checked only while it is written or has a bad word, because
@@ -296,11 +296,11 @@ impl<C: Circuit> Cpu<C> {
         self.trapped.set(false);
         self.chip_mut().first = true;
         self.chip_mut().core_runs = true;
-        self.suspects.set(AFTER_STOP);
+        self.suspects.left.set(SUSPECTS);
         let result = loop {
             let pc = self.get(Register::PC);
             let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
-            if !self.again.replace(false) {
+            if !self.suspects.again.replace(false) {
                 break result;
             }
             self.set(Register::XPSR, self.get(Register::XPSR) & !IT_STATE);
@@ -387,6 +387,21 @@ fn stopped<C: Circuit>(uc: &mut Unicorn<Chip<C>>, address: u32) -> bool {
         uc.emu_stop().ok();
     }
     stops
+}
+
+impl Suspects {
+    /// Whether the core was stopped at this address, because it begins with the state of a finished IT block.
+    #[inline(always)]
+    fn stops_at<C: Circuit>(&self, uc: &mut Unicorn<Chip<C>>, address: u32) -> bool {
+        let Some(left) = self.left.get().checked_sub(1) else { return false };
+        self.left.set(left);
+        let stale = is_stale(uc, address);
+        if stale {
+            self.again.set(true);
+            uc.emu_stop().ok();
+        }
+        stale
+    }
 }
 
 /// Whether the emulator mistakes the first instructions of a block for those of a finished IT block. This happens if
