@@ -345,6 +345,19 @@ impl Plant {
         Ok(())
     }
 
+    /// Changes sensors and magnetic settings to those of `settings`, and keeps the state: an asymmetry that arises during a run. Model A
+    /// has no magnetic settings.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn set_asymmetry(&mut self, settings: &PlantSettings) -> Result<(), PlantError> {
+        self.around.sensors.set(&settings.measurement)?;
+        if let (Motor::Energy(motor), Some(iron)) = (&mut self.motor, &settings.iron) {
+            motor.machine = EnergyMachine::new(&settings.machine, iron)?;
+        }
+        Ok(())
+    }
+
     /// Changes the assumed saliency of model A and keeps the state. It has no effect on the energy model, whose
     /// saliency comes from its magnetic settings.
     ///

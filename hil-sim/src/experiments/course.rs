@@ -10,6 +10,8 @@ pub use kind::{KINDS, Kind, chosen};
 pub use limits::{allowed_a, nominal_limit_a, share_of_limit, torque_limit_a, torque_nm};
 pub use trial::{CLASSES_PER_DEG, Refused, Trial, UNNOTICED_S};
 
+use super::disturbed::Asymmetry;
+
 /// A value at the beginning and at the end of a part, with a straight line between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ramp(pub f64, pub f64);
@@ -47,6 +49,8 @@ pub enum Change {
     Brake,
     /// The angle error counts after this time, s.
     Count(f64),
+    /// The asymmetry arises.
+    Asymmetry(Asymmetry),
 }
 
 /// A part of a run. Currents and speeds are for the dissertation's motor; on others they are in proportion, q-axis

@@ -343,7 +343,7 @@ keys! {
     "battery." battery: BatteryConfig {
         /// Kind of runs: kinds for the twelve kinds, load for load steps, hold for torque near the maximum at
         /// standstill, forced for a sudden rotation of the flux, restless for dithered torque, dragged for a shaft that
-        /// is driven through zero stator frequency under torque.
+        /// is driven through zero stator frequency under torque, arising for the same with an asymmetry that arises after the start.
         runs: BatteryRuns = BatteryRuns::Kinds, word();
         /// Load step of battery.runs = load, relative to the torque at the nominal limit of the q-axis current.
         load_share: f64 = 0.4, number(), 0 .. 2;

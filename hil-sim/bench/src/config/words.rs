@@ -66,6 +66,8 @@ words! {
         Restless = "restless",
         /// A shaft that is driven through zero stator frequency under torque.
         Dragged = "dragged",
+        /// The same, with an asymmetry that arises after the start.
+        Arising = "arising",
     }
 
     /// Task of the drive in runs over the whole speed range.

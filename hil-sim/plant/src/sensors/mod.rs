@@ -172,6 +172,24 @@ impl Sensors {
         }
     }
 
+    /// Changes the settings, and keeps current, faults and heat sink.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn set(&mut self, s: &MeasurementSettings) -> Result<(), PlantError> {
+        let mut new = Self::new(s)?;
+        (new.filtered, new.heat_sink) = (self.filtered, self.heat_sink);
+        for (new, old) in new.channels.iter_mut().zip(&self.channels) {
+            new.fault = old.fault;
+        }
+        if let Some(rare) = &mut new.rare {
+            let [a, b, _] = phases(new.filtered);
+            rare.rest([a, b]);
+        }
+        *self = new;
+        Ok(())
+    }
+
     /// Sets the fault of a channel.
     pub fn set_fault(&mut self, channel: Channel, fault: CurrentFault) {
         self.channels[channel as usize].fault = fault;

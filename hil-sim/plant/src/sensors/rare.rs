@@ -52,6 +52,12 @@ impl CurrentErrors {
         acts.then_some(errors)
     }
 
+    /// Begins with these currents of phases a and b, A.
+    pub(super) fn rest(&mut self, [a, b]: [f64; 2]) {
+        (self.before_b, self.behind_b) = (b, b);
+        self.now = [a + self.cross_talk[0] * b, b + self.cross_talk[1] * a];
+    }
+
     /// Begins a period with this number of pulses; the middle is the middle of the last pulse.
     pub(super) fn begin(&mut self, period: f64, pulses: u16) {
         self.until_middle = period - 0.5 * period / f64::from(pulses);

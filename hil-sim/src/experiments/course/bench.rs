@@ -219,6 +219,11 @@ impl<'a> Bench<'a> {
             }
             Change::Brake => return self.brake(),
             Change::Count(seconds) => self.count_after(seconds),
+            Change::Asymmetry(asymmetry) => {
+                let mut changed = config.clone();
+                asymmetry.add(&mut changed);
+                plant.set_asymmetry(&plant_settings(&changed)).map_err(Error::refused)?;
+            }
             Change::Nothing | Change::Flux(_) => {}
         }
         Ok(true)

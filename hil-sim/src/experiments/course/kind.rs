@@ -40,6 +40,8 @@ pub enum Kind {
     /// Constant q-axis current while a dynamometer drives the shaft through zero stator frequency, into or out of
     /// generating. An asymmetry appears after the saliency self-commissioning.
     Dragged(Asymmetry),
+    /// The same with an asymmetry that arises after the start.
+    Arising(Asymmetry),
     /// Constant q-axis currents of either sign, each while a dynamometer drives the shaft through zero stator frequency, there and back.
     Quadrants,
 }
@@ -64,16 +66,19 @@ pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
             let of = |forced| [100, 600, 6000].map(|hz| Kind::Restless { hz, forced });
             ([false, true].map(of).concat(), 16 * 6)
         }
-        BatteryRuns::Dragged => {
+        BatteryRuns::Dragged | BatteryRuns::Arising => {
+            let arises = config.battery.runs == BatteryRuns::Arising;
             let (a, b) = ([10, -10].map(Asymmetry::GainA), [10, -10].map(Asymmetry::GainB));
-            let mut all = [a, b, [5, -5].map(Asymmetry::CrossTalk)].concat();
+            let cross_talk = if arises { [10, -10] } else { [5, -5] };
+            let mut all = [a, b, cross_talk.map(Asymmetry::CrossTalk)].concat();
             all.insert(0, Asymmetry::None);
             if config.model.plant != PlantModel::A {
                 // Model A has no saliency that is fixed to the stator.
                 all.extend([6, -6].map(Asymmetry::StatorFixed));
             }
             let runs = 24 * all.len();
-            (all.into_iter().map(Kind::Dragged).collect(), runs)
+            let kind = if arises { Kind::Arising } else { Kind::Dragged };
+            (all.into_iter().map(kind).collect(), runs)
         }
     }
 }
@@ -99,6 +104,8 @@ const DRAGGED_RPM_PER_S: (f64, f64) = (5.0, 300.0);
 const DRAGGED_RPM: (f64, f64) = (150.0, 300.0);
 const UNLOADED_RPM_PER_S: f64 = 600.0;
 const DRAGGED_S: (f64, f64) = (1.5, 20.0);
+/// Time after the start when an asymmetry arises, s.
+const ARISES_S: f64 = 0.5;
 
 impl Kind {
     /// Describes the kind in words.
@@ -119,6 +126,7 @@ impl Kind {
                 format!("steps at {hz} Hz{}", if forced { ", flux turned" } else { "" })
             }
             Self::Dragged(asymmetry) => format!("dragged, {}", asymmetry.name()),
+            Self::Arising(asymmetry) => format!("dragged, {} after the start", asymmetry.name()),
             Self::Quadrants => "four quadrants".to_owned(),
         }
     }
@@ -169,7 +177,7 @@ impl Kind {
                 let turned = Part { change: turn(random), ..Part::constant(i_q, TURN_S.1) };
                 (Shaft::at(rpm), vec![Part::constant(i_q, TURN_S.0), turned])
             }
-            Self::Dragged(_) => {
+            Self::Dragged(_) | Self::Arising(_) => {
                 let i_q = sign * random.random_range(DRAGGED_SHARE..=1.0) * MOST_A;
                 let (least, most) = DRAGGED_RPM_PER_S;
                 let rate = least * (most / least).powf(random.random_range(0.0..=1.0));
@@ -181,6 +189,10 @@ impl Kind {
                 } else {
                     (vec![dragged(0.0, (0.0, braked), UNLOADED_RPM_PER_S)], (braked, 0.0))
                 };
+                if let Self::Arising(asymmetry) = self {
+                    let arises = Part::event(Change::Asymmetry(asymmetry));
+                    parts.splice(0..0, [Part::constant(0.0, ARISES_S), arises]);
+                }
                 parts.extend([held(DRAGGED_S.0), dragged(i_q, ends, rate), held(DRAGGED_S.1)]);
                 (Shaft::Held(0.0), parts)
             }
