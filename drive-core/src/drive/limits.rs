@@ -40,13 +40,8 @@ impl<L: AngleLoop> Coefficients<L> {
     /// Resets the limits at a start.
     pub(super) fn start_limits(&self, limits: &mut Limits) {
         let voltage = self.voltage_limit.start();
-        *limits = Limits {
-            voltage,
-            power_error: 0.0,
-            now: DcLinkLimits::default(),
-            why: Limiting::None,
-            ..*limits
-        };
+        (limits.voltage, limits.power_error) = (voltage, 0.0);
+        (limits.now, limits.why) = Default::default();
         limits.now.i_q = (-voltage.most.q, voltage.most.q);
     }
 

@@ -136,11 +136,8 @@ impl<L: AngleLoop> Drive<L> {
         if matches!(job, Start::Field(Goal::Learn)) {
             k.learned = None;
         }
-        self.enter(Phase::Prepare(Prepare {
-            step: Preparation::Offsets(OffsetCheckState::default()),
-            job,
-            carried,
-        }));
+        let step = Preparation::Offsets(OffsetCheckState::default());
+        self.enter(Phase::Prepare(Prepare { step, job, carried }));
     }
 }
 

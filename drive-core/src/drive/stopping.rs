@@ -64,13 +64,9 @@ impl<L: AngleLoop> Coefficients<L> {
 
     fn stop_field(&self, s: &mut Field<L::State>, k: &mut Common, stop: Stop) {
         match (&mut s.goal, stop) {
-            (Goal::Release | Goal::Hold { .. }, _) | (Goal::Brake { .. }, Stop::Ramp) => {
-                return;
-            }
-            (Goal::Brake { quick }, Stop::Quick) => {
-                *quick = true;
-                return;
-            }
+            (Goal::Release | Goal::Hold { .. }, _) => return,
+            (Goal::Brake { .. }, Stop::Ramp) => return,
+            (Goal::Brake { quick }, Stop::Quick) => return *quick = true,
             _ => {}
         }
         let regulates = s.regulates();

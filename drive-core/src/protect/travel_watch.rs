@@ -102,13 +102,8 @@ impl TravelWatch {
     ///
     /// # Errors
     /// [`Fault::SensorSilentA`] or [`Fault::SensorSilentB`].
-    pub fn step(
-        &self,
-        state: &mut TravelWatchState,
-        index: usize,
-        phases: &Abc,
-    ) -> Result<(), Fault> {
-        let TravelWatchState { stuck, open, pace } = state;
+    pub fn step(&self, s: &mut TravelWatchState, index: usize, phases: &Abc) -> Result<(), Fault> {
+        let TravelWatchState { stuck, open, pace } = s;
         let (n, now, fault) = match index % STUCK.every {
             0 => (0, phases.a, Fault::SensorSilentA),
             _ => (1, phases.b, Fault::SensorSilentB),
