@@ -213,23 +213,23 @@ struct Field<S> {
     pub rotor: RotorCount,
     pub prediction: PredictionState,
     pub motion: MotionState,
-    pub carrier_watch: CarrierWatch,
-    pub saliency_check: SaliencyCheckState,
-    pub lock: LockMonitorState,
     pub noise: NoiseWatchState,
     pub inverter_drop: InverterDropState,
     /// Angle by which the flux leads the frame, also as a unit vector: 0 except during self-commissioning.
     pub lead: Angle,
     pub lead_axis: UnitVector,
     pub goal: Goal,
-    /// Results of the run before. The residual flux is kept until the speed of the shaft is found.
-    pub carried: CarryOver,
     /// Large, since it contains the state of the alternative demodulators.
     pub estimator: EstimatorState<S>,
     /// Large during the search of a flying start.
     pub flux: FluxPhase,
     /// Asymmetry that was measured before there was current or flux, beyond the known asymmetry.
     pub at_start: Option<Asymmetry>,
+    /// Results of the run before. The residual flux is kept until the speed of the shaft is found.
+    pub carried: CarryOver,
+    pub carrier_watch: CarrierWatch,
+    pub saliency_check: SaliencyCheckState,
+    pub lock: LockMonitorState,
 }
 
 /// The source of the angle of the frame.

@@ -5,8 +5,8 @@ pub const POINTS: usize = 16;
 /// Largest current of a table, as a multiple of the distance of the points.
 const STEPS: f32 = 14.0;
 
-/// The q-axis currents of the points: 0, a step, two steps, and so on.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+/// The q-axis currents of the points: 0, a step, two steps, and so on. By default the step is 0, so every current is at the first point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Grid {
     step_a: f32,
     per_step: f32,

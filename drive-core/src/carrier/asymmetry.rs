@@ -9,11 +9,21 @@
 //! q_n = constant + sin sin 2 theta + cos cos 2 theta              |C| = 1 + sin cos 2 theta - cos sin 2 theta
 //! ```
 //!
-//! with `sin = Re n` and `cos = -Im n`. The three numbers are [learned](crate::identify::learning) and subtracted.
+//! with `sin = Re n` and `cos = -Im n`. The three numbers are [learned](crate::identify::learning) and subtracted. A change of `n`
+//! [is followed](Asymmetry::follow) in `|C|` while the frame rotates.
 //! (Products with the saliency of the flux are of second order and neglected.)
 
-use crate::carrier::Saliency;
-use crate::{SQRT_3, UnitVector};
+use crate::carrier::{CARRIER_SAMPLES, Saliency};
+use crate::learned::LARGEST_ASYMMETRY;
+use crate::math::limited;
+use crate::{PERIOD_S, SQRT_3, UnitVector};
+
+/// Control periods from one call of [`Asymmetry::follow`] to the next.
+const EVERY: f32 = 2.0 * CARRIER_SAMPLES as f32;
+/// Turns of the doubled angle, and least time, s, in which a change is followed. With a third of them, the noise costs 0.2 degrees rms on
+/// `m4b` and 1.6 on `g7` with low flux.
+const TURNS: f32 = 3.0;
+const LEAST_S: f32 = 0.9;
 
 /// The learned numbers, dimensionless; 0 without an asymmetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -61,6 +71,22 @@ impl Asymmetry {
         saliency.carrier_squared *= 1.0 - 2.0 * self.along(twice);
     }
 
+    /// Follows a change of the asymmetry by its effect along the injection axis; called once in two injection periods. `beyond` is the part
+    /// of the squared injection current beyond its mean, relative to the expected one, with the injection along `axis`, which rotates at
+    /// `freq`, electrical turns per control period. Where the axis stands, this effect cannot be told from that of the flux, and nothing
+    /// changes.
+    pub fn follow(&mut self, beyond: f32, axis: UnitVector, freq: f32) {
+        let twice = axis.turned_by(axis);
+        let step = beyond * limited(2.0 / TURNS * EVERY * freq.abs(), EVERY * PERIOD_S / LEAST_S);
+        let (sin, cos) = (step * twice.cos, -step * twice.sin);
+        // That of the gain mismatch that explains most of both, by least squares.
+        let constant = 0.25 * cos - 0.75 / SQRT_3 * sin;
+        let changed = self.plus(&Self { constant, sin, cos }, 1.0);
+        if changed.size() <= LARGEST_ASYMMETRY {
+            *self = changed;
+        }
+    }
+
     /// Returns the part of the asymmetry in the relative injection current along the injection axis, whose doubled angle is
     /// `twice`.
     pub(crate) fn along(&self, twice: UnitVector) -> f32 {
@@ -82,6 +108,39 @@ mod tests {
         let (m_a, m_b) = (a * i_a + x * i_b, b * i_b);
         let (alpha, beta) = (m_a, (m_a + 2.0 * m_b) / 3.0_f64.sqrt());
         (alpha * theta.cos() + beta * theta.sin(), -(beta * theta.cos() - alpha * theta.sin()))
+    }
+
+    /// A change shows in the injection current of an axis that rotates. The constant part is that of the nearest gain mismatch, and the
+    /// mismatch of the gains is found whole. An axis that stands shows nothing.
+    #[test]
+    fn a_change_is_followed_while_the_axis_rotates() {
+        let rest = |change: &Asymmetry, hz: f64, seconds: f64| {
+            let mut found = Asymmetry::default();
+            for n in 0..(300.0 * seconds) as u32 {
+                let turns = (0.1 + hz * f64::from(n) / 300.0).fract();
+                let axis = Angle::from_turns(turns as f32).unit_vector();
+                let rest = change.plus(&found, -1.0);
+                let beyond = 2.0 * rest.along(axis.turned_by(axis));
+                found.follow(beyond, axis, (hz / 6000.0) as f32);
+            }
+            change.plus(&found, -1.0)
+        };
+        for hz in [0.5, -2.0, 10.0, 100.0] {
+            // Four time constants.
+            let seconds = 4.0 * f64::max(1.5 / f64::abs(hz), 0.9);
+            for mismatch in [0.01, -0.02] {
+                let change = Asymmetry::of_gain_mismatch(mismatch);
+                let left = rest(&change, hz, seconds);
+                assert!(left.size() < 0.05 * change.size(), "{hz} Hz: {left:?}");
+            }
+            // Of the stator.
+            let change = Asymmetry { constant: 0.0, sin: 0.002, cos: 0.004 };
+            let left = rest(&change, hz, seconds);
+            assert!(left.sin.hypot(left.cos) < 0.05 * change.size(), "{hz} Hz: {left:?}");
+            assert!(left.constant.abs() < 0.5 * change.size(), "{hz} Hz: {left:?}");
+        }
+        let change = Asymmetry::of_gain_mismatch(0.01);
+        assert_eq!(rest(&change, 0.0, 1.0), change);
     }
 
     #[test]

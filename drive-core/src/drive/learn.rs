@@ -94,8 +94,10 @@ impl<L: AngleLoop> Coefficients<L> {
         if let Some(observer) = &mut self.observer {
             observer.take(learned);
         }
-        if let Some(monitor) = &mut self.lock_monitor {
-            monitor.take(learned);
+        if let Some(monitor) = &mut self.lock_monitor
+            && let (Some(carrier), Some(slope)) = (&learned.carrier, &learned.slope)
+        {
+            monitor.take(carrier, slope, self.estimator.sign);
         }
         if let Some(at_start) = &mut self.at_start {
             at_start.learned = learned.at_start;

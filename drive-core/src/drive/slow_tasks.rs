@@ -9,7 +9,7 @@
 //! | 3 | current limits by the voltage; judgement of the prediction | voltages (1), rotor voltage (2) |
 //! | 4 | injection signal for the filter, corrections of the tracked angle | saliency (0), speed (9) |
 //! | 5 | reference current of the saliency; covariance of the filter after the angles, or its prediction (first part); slow axes | angle (4) |
-//! | 6 | gains of the observer; prediction of the filter (second part); voltages for the prediction at 8 | sums (9) |
+//! | 6 | gains of the observer; prediction of the filter (second part), or asymmetry; voltages for the prediction at 8 | sums (9) |
 //! | 7 | weights of the speed for the filter; rotor voltage for the prediction at 8 | magnetising current (0), gains (6) |
 //! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
 //! | 9 | averages of the demodulation; restart of the sums; speed for the filter; injection current in both channels | ten samples mixed, ten turns summed, weights (7) |
@@ -21,7 +21,7 @@
 use super::trust::{Check, Lock, Trust};
 use super::{Common, Field, FluxPhase};
 use crate::carrier::CARRIER_SAMPLES;
-use crate::carrier::synchronous::REFERENCE_AT;
+use crate::carrier::synchronous::{AVERAGES_LAG, REFERENCE_AT};
 use crate::current::voltage_limit::{OperatingPoint, VoltageLimitState};
 use crate::protect::Thermal;
 use crate::protect::plausibility::{RotorFlux, Uncertainty};
@@ -125,6 +125,9 @@ impl<L: AngleLoop> Coefficients<L> {
                 let decay = s.observer.resistance.decay;
                 self.estimator
                     .run(&mut s.estimator, |filter, state, _| filter.predict(state, decay));
+                if !s.estimator.filter.predicts {
+                    self.follow_asymmetry(s, step.carrier_axis, step.flux_freq);
+                }
                 s.prediction.latch_voltage();
                 Ok(())
             }
@@ -239,16 +242,22 @@ impl<L: AngleLoop> Coefficients<L> {
     #[inline(never)] // inlined, 56 bytes more of control code
     fn check_lock(&self, s: &mut Field<L::State>, step: &StepResults) -> Result<(), Fault> {
         let Some(monitor) = &self.lock_monitor else { return Ok(()) };
-        let baseline = match step.trust.lock {
-            Lock::Off => return Ok(()),
-            Lock::Baseline => true,
-            Lock::Watch => !s.lock.is_measured(),
-        };
-        if !(self.injects(s) && s.carrier.is_settled()) {
+        let lock = step.trust.lock;
+        if lock == Lock::Off || !(self.injects(s) && s.carrier.is_settled()) {
             return Ok(());
         }
+        let baseline = lock == Lock::Baseline || !s.lock.is_measured();
         let seen = s.estimator.synchronous.saliency;
         monitor.step(&mut s.lock, &seen, s.carrier.per_share_squared, baseline)
+    }
+
+    /// Follows a change of the asymmetry, with the injection axis and the frequency of the flux in this sample.
+    #[inline(never)] // in the flash
+    fn follow_asymmetry(&self, s: &mut Field<L::State>, axis: UnitVector, freq: f32) {
+        let Some(monitor) = &self.lock_monitor else { return };
+        // The averages are six samples older than in sample 0.
+        let axis = axis.turned_slightly(-freq * (AVERAGES_LAG + 6.0));
+        s.estimator.changed.follow(monitor.beyond(&mut s.lock), axis, freq);
     }
 
     /// Checks that both current sensors see the injection current.

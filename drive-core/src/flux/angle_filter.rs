@@ -107,7 +107,7 @@ pub struct AngleFilter {
 pub struct AngleFilterState {
     covariance: Covariance,
     /// Whether the covariance is predicted in this injection period; otherwise it is reduced by the angles.
-    predicts: bool,
+    pub predicts: bool,
     /// Weights of the latest measurement.
     weights: Weights,
     /// Information of the angles and of the speed by which the covariance is not reduced yet.

@@ -34,16 +34,18 @@
 //! An error of 180° gives no deficit by symmetry, but the current does not maintain it: the flux decays
 //! through zero to the true sign, or the deficit is detected during the decay.
 //!
+//! An asymmetry of sensors or stator that arises during a run changes `|C|` with the direction of the axis in the stator. Therefore the
+//! [asymmetry](crate::carrier::Asymmetry::follow) follows the part of `|C|` that is [beyond its mean](LockMonitor::beyond).
+//!
 //! `|C|_ref` is the injection current measured during magnetisation, when the direction of the flux is
 //! known, times a learned even function of i_q.
 
 use crate::Fault;
 use crate::carrier::Saliency;
-use crate::learned::Learned;
 use crate::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 
 /// Coefficients of the monitor.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LockMonitor {
     /// Q-axis currents of the table of the injection current.
     pub grid: Grid,
@@ -52,8 +54,6 @@ pub struct LockMonitor {
     /// Saliency deficit per relative change of the squared injection current: -1/k, with the other sign if the injection lies along
     /// the flux.
     pub per_change: [f32; POINTS],
-    /// Sign of the saliency along the injection axis, as in [`Estimator`](crate::flux::Estimator).
-    pub sign: f32,
     /// Share of the newest value in the mean deficit.
     pub smoothing: f32,
     /// Allowed mean deficit, where 1 corresponds to zero flux, and whether the sensitivity is positive, which determines the limit of a
@@ -75,6 +75,8 @@ pub struct LockMonitorState {
     per_baseline: f32,
     /// Mean saliency deficit.
     pub loss: f32,
+    /// Latest saliency deficit; the mean one after it was used.
+    latest: f32,
     /// Q-axis current of the last injection period, A.
     i_q: f32,
     /// Injection periods for which the q-axis current has been constant.
@@ -113,24 +115,13 @@ const REST: u8 = 12;
 const ALLOWANCE: (u8, u8, u8) = (3, 2, 72);
 
 impl LockMonitor {
-    /// Returns `grid`, `inverse_square`, `per_change` and `is_positive` of an injection current over i_q and of a saliency sensitivity.
-    pub fn tables(
-        carrier: &CarrierTable,
-        slope: &SlopeTable,
-        sign: f32,
-    ) -> (Grid, [f32; POINTS], [f32; POINTS], bool) {
-        let inverse_square = carrier.points().map(|r| 1.0 / (r * r));
-        let per_change = slope.inverses(MOST_UNIT).map(|inverse| -sign * inverse);
-        (carrier.grid(), inverse_square, per_change, slope.at_rest() > 0.0)
-    }
-
-    /// Takes an accepted result of a self-commissioning.
+    /// Takes the injection current over i_q and the saliency sensitivity; `sign` as in [`Estimator`](crate::flux::Estimator).
     #[cold] // in the flash
-    pub fn take(&mut self, learned: &Learned) {
-        if let (Some(carrier), Some(slope)) = (&learned.carrier, &learned.slope) {
-            (self.grid, self.inverse_square, self.per_change, self.is_positive) =
-                Self::tables(carrier, slope, self.sign);
-        }
+    pub fn take(&mut self, carrier: &CarrierTable, slope: &SlopeTable, sign: f32) {
+        self.grid = carrier.grid();
+        self.inverse_square = carrier.points().map(|r| 1.0 / (r * r));
+        self.per_change = slope.inverses(MOST_UNIT).map(|inverse| -sign * inverse);
+        self.is_positive = slope.at_rest() > 0.0;
     }
 
     /// Evaluates one injection period.
@@ -176,9 +167,17 @@ impl LockMonitor {
         let place = self.grid.place(saliency.i_q);
         let deviation = carrier * state.per_baseline * between(&self.inverse_square, place) - 1.0;
         let loss = -deviation * between(&self.per_change, place);
+        state.latest = loss;
         state.loss += self.smoothing * (loss - state.loss);
         let least = -ALLOWED_GAIN[usize::from(self.is_positive)];
         Fault::LostLock.unless(state.loss <= self.allowed && state.loss >= least)
+    }
+
+    /// Returns by how much the squared injection current, relative to the expected one, is beyond its mean; 0 if nothing was judged since
+    /// the last call.
+    pub fn beyond(&self, state: &mut LockMonitorState) -> f32 {
+        let beyond = state.loss - core::mem::replace(&mut state.latest, state.loss);
+        beyond / between(&self.per_change, self.grid.place(state.i_q))
     }
 
     /// Whether the q-axis current `i_q`, A, has just changed, so that the deficit is not judged.

@@ -220,21 +220,16 @@ impl Settings {
 
     /// Returns the lock monitor; `carrier_a` is the expected injection current along the injection axis, A peak.
     fn lock_monitor(&self, carrier_a: f32) -> LockMonitor {
-        let (t, sign) = (&self.injection.synchronous, self.injection.axis.sign());
-        let (grid, inverse_square, per_change, is_positive) =
-            LockMonitor::tables(&self.carrier(), &self.slope(), sign);
-        let least = LEAST_CARRIER * carrier_a;
-        LockMonitor {
-            grid,
-            inverse_square,
-            per_change,
-            sign,
+        let (t, least) = (&self.injection.synchronous, LEAST_CARRIER * carrier_a);
+        let mut monitor = LockMonitor {
             smoothing: CARRIER_S / (t.deficit_s + CARRIER_S),
             allowed: t.allowed_deficit,
-            is_positive,
             moved: self.share_of_rated(MOVED_A),
             least: least * least,
-        }
+            ..LockMonitor::default()
+        };
+        monitor.take(&self.carrier(), &self.slope(), self.injection.axis.sign());
+        monitor
     }
 
     fn motor_plant(&self) -> Result<FirstOrder, TuningError> {

@@ -6,19 +6,15 @@ use super::*;
 /// flux. `sign`: 1 with the injection across the flux, -1 along it.
 fn monitor_of(a: f32, sign: f32) -> LockMonitor {
     let slope = SlopeTable::of_flux_saliency(Grid::REFERENCE, a);
-    let (grid, inverse_square, per_change, is_positive) =
-        LockMonitor::tables(&CarrierTable::default(), &slope, sign);
-    LockMonitor {
-        grid,
-        inverse_square,
-        per_change,
-        sign,
+    let mut monitor = LockMonitor {
         smoothing: 1.0 / (1.0 + 600.0 * 0.12),
         allowed: 0.55,
-        is_positive,
         moved: 0.03,
         least: 0.13 * 0.13,
-    }
+        ..LockMonitor::default()
+    };
+    monitor.take(&CarrierTable::default(), &slope, sign);
+    monitor
 }
 
 fn monitor() -> LockMonitor {
@@ -177,4 +173,23 @@ fn the_carrier_of_a_lost_flux_ends_the_lock() {
     assert!(monitor.step(&mut state, &gone, 1.0, false).is_ok());
     let mut after = (0..90).map(|_| monitor.step(&mut state, &gone, 1.0, false));
     assert!(after.any(|result| result == Err(Fault::LostLock)));
+}
+
+/// The squared injection current beyond its mean is returned once, with its sign, whatever the unit of the deficit.
+#[test]
+fn a_current_beyond_its_mean_is_told_once() {
+    for (sign, point) in [(1.0, 0), (-1.0, 8)] {
+        let monitor = monitor_of(-0.035, sign);
+        let mut state = ready(&monitor);
+        let (i_q, ratio) = (monitor.grid.current(point), CarrierTable::default().points()[point]);
+        for _ in 0..60 {
+            monitor.step(&mut state, &seen(0.27 * ratio, i_q), 1.0, false).unwrap();
+        }
+        monitor.beyond(&mut state);
+        assert_eq!(monitor.beyond(&mut state), 0.0);
+        monitor.step(&mut state, &seen(0.27 * ratio * 1.005, i_q), 1.0, false).unwrap();
+        let beyond = monitor.beyond(&mut state);
+        assert!((beyond - 0.01).abs() < 5e-4, "{beyond}");
+        assert_eq!(monitor.beyond(&mut state), 0.0);
+    }
 }
