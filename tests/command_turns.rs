@@ -9,6 +9,8 @@ use hil_sim::rig::Rig;
 
 /// Time after a command, s: a stop by ramp has ended.
 const BEHIND_S: f64 = 0.7;
+/// Share of a sample in the means of reference and current: 10 ms.
+const SHARE: f64 = 1.0 / 60.0;
 /// Largest error of the angle while the drive tracks the flux, electrical degrees.
 const TRACKED_DEG: f64 = 25.0;
 
@@ -20,7 +22,7 @@ struct Bench {
     commands: Vec<Command>,
 }
 
-/// Result of a command: the answer, the state after it, and the last reference and current, A.
+/// Result of a command: the answer, the state after it, and the means of the last reference and current, A.
 #[derive(Debug)]
 struct Outcome {
     answer: Result<Accepted, Refused>,
@@ -93,7 +95,8 @@ impl Bench {
         rig.run(BEHIND_S, |point| {
             assert!(point.current < trip_a, "{name}: {} A", point.current);
             if regulates {
-                (reference, current) = (point.iq_ref, point.iq);
+                reference += SHARE * (point.iq_ref - reference);
+                current += SHARE * (point.iq - current);
             }
         });
         let state = rig.drive.state();
