@@ -133,7 +133,7 @@ mod tests {
                 let left = rest(&change, hz, seconds);
                 assert!(left.size() < 0.05 * change.size(), "{hz} Hz: {left:?}");
             }
-            // Of the stator.
+            // A saliency of the stator.
             let change = Asymmetry { constant: 0.0, sin: 0.002, cos: 0.004 };
             let left = rest(&change, hz, seconds);
             assert!(left.sin.hypot(left.cos) < 0.05 * change.size(), "{hz} Hz: {left:?}");
