@@ -9,8 +9,6 @@ use crate::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 pub(crate) const SPREAD: f32 = 0.005;
 /// Largest accepted gain mismatch.
 pub(crate) const LARGEST_MISMATCH: f32 = 0.1;
-/// Largest accepted asymmetry: a gain mismatch of 10 % has 0.083.
-pub(crate) const LARGEST_ASYMMETRY: f32 = 0.1;
 /// Largest accepted current-dependent saliency at a current of one step of the table, and largest rms misfit of
 /// its law relative to the rms of the saliency offset.
 pub(crate) const CURRENT_SALIENCY: (f32, f32) = (0.075, 0.35);
@@ -190,8 +188,8 @@ impl Learned {
             && self.spread <= SPREAD
             && (1..POINTS).contains(&self.points)
             && self.positions > 0
-            && self.asymmetry.size() <= LARGEST_ASYMMETRY
-            && self.at_start.is_none_or(|seen| seen.size() <= LARGEST_ASYMMETRY)
+            && self.asymmetry.size() <= Asymmetry::LARGEST
+            && self.at_start.is_none_or(|seen| seen.size() <= Asymmetry::LARGEST)
             && self.slope_at_rest == slope
             && (least_limit_a..=POINTS as f32 * step).contains(&self.limit_a)
             && within(&self.gain_mismatch, LARGEST_MISMATCH)

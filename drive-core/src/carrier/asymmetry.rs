@@ -14,7 +14,6 @@
 //! (Products with the saliency of the flux are of second order and neglected.)
 
 use crate::carrier::{CARRIER_SAMPLES, Saliency};
-use crate::learned::LARGEST_ASYMMETRY;
 use crate::math::limited;
 use crate::{PERIOD_S, SQRT_3, UnitVector};
 
@@ -37,6 +36,9 @@ pub struct Asymmetry {
 }
 
 impl Asymmetry {
+    /// Largest accepted asymmetry: a gain mismatch of 10 % has 0.083.
+    pub(crate) const LARGEST: f32 = 0.1;
+
     /// Returns the asymmetry caused by a gain of sensor a that is higher by `mismatch`/2 and a gain of sensor b that is lower by
     /// the same amount.
     pub const fn of_gain_mismatch(mismatch: f32) -> Self {
@@ -82,7 +84,7 @@ impl Asymmetry {
         // That of the gain mismatch that explains most of both, by least squares.
         let constant = 0.25 * cos - 0.75 / SQRT_3 * sin;
         let changed = self.plus(&Self { constant, sin, cos }, 1.0);
-        if changed.size() <= LARGEST_ASYMMETRY {
+        if changed.size() <= Self::LARGEST {
             *self = changed;
         }
     }

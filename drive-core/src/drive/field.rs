@@ -6,12 +6,11 @@ use super::slow_tasks::StepResults;
 use super::stopping::COAST;
 use super::{CarryOver, Common, End, Field, FluxPhase, Frame, Goal};
 use crate::carrier::at_start::{AtStart, AtStartState};
-use crate::carrier::{CarrierPeriod, CarrierSample};
+use crate::carrier::{Asymmetry, CarrierPeriod, CarrierSample};
 use crate::current::{DIRECT_SHARE, DIRECT_SHARE_WITHOUT_CARRIER, inverter_drop::DropSample};
 use crate::drive::state::State;
 use crate::filter::LPF;
 use crate::identify::learning::LearningState;
-use crate::learned::LARGEST_ASYMMETRY;
 use crate::math::limited;
 use crate::motion::Target;
 use crate::protect::SaliencyCheck;
@@ -379,7 +378,7 @@ impl<L: AngleLoop> Coefficients<L> {
         if let (Frame::Tracked, Some(change)) = (s.frame, at_start.change(state)) {
             let known = &mut s.estimator.changed;
             *known = known.plus(&change, 1.0);
-            if known.size() > LARGEST_ASYMMETRY {
+            if known.size() > Asymmetry::LARGEST {
                 return Err(Fault::NothingLearned);
             }
         }

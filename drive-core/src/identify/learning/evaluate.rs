@@ -3,9 +3,7 @@
 use super::{Fitted, Learned, Learning, LearningState};
 use crate::UnitVector;
 use crate::carrier::{Asymmetry, Saliency};
-use crate::learned::{
-    CURRENT_SALIENCY, LARGEST_ASYMMETRY, LARGEST_MISMATCH, LEAST_LIMIT, RIPPLE, SPREAD, Verdict,
-};
+use crate::learned::{CURRENT_SALIENCY, LARGEST_MISMATCH, LEAST_LIMIT, RIPPLE, SPREAD, Verdict};
 use crate::protect::SaliencyCheck;
 use crate::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
@@ -37,7 +35,7 @@ impl Learning {
         let (reference, current_saliency) = self.reference(state);
         let (slope, slope_at_rest, limit_a) = self.slope(state);
         let ripple = fpu_sqrt::sqrtf(state.ripple);
-        let verdict = if reference.is_none() || asymmetry.size() > LARGEST_ASYMMETRY {
+        let verdict = if reference.is_none() || asymmetry.size() > Asymmetry::LARGEST {
             Verdict::OutOfRange
         } else if self.normalised && !Verdict::of_slope(slope_at_rest).is_accepted() {
             // This verdict comes first, because a better lock of the shaft does not raise the sensitivity.
