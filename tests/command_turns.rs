@@ -10,7 +10,7 @@ use hil_sim::rig::Rig;
 /// Time after a command, s: a stop by ramp has ended.
 const BEHIND_S: f64 = 0.7;
 /// Share of a sample in the means of reference and current: 10 ms.
-const SHARE: f64 = 1.0 / 60.0;
+const SHARE_IN_MEAN: f64 = 1.0 / 60.0;
 /// Largest error of the angle while the drive tracks the flux, electrical degrees.
 const TRACKED_DEG: f64 = 25.0;
 
@@ -95,8 +95,8 @@ impl Bench {
         rig.run(BEHIND_S, |point| {
             assert!(point.current < trip_a, "{name}: {} A", point.current);
             if regulates {
-                reference += SHARE * (point.iq_ref - reference);
-                current += SHARE * (point.iq - current);
+                reference += SHARE_IN_MEAN * (point.iq_ref - reference);
+                current += SHARE_IN_MEAN * (point.iq - current);
             }
         });
         let state = rig.drive.state();

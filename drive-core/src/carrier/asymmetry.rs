@@ -73,10 +73,10 @@ impl Asymmetry {
         saliency.carrier_squared *= 1.0 - 2.0 * self.along(twice);
     }
 
-    /// Follows a change of the asymmetry by its effect along the injection axis; called once in two injection periods. `beyond` is the part
-    /// of the squared injection current beyond its mean, relative to the expected one, with the injection along `axis`, which rotates at
-    /// `freq`, electrical turns per control period. Where the axis stands, this effect cannot be told from that of the flux, and nothing
-    /// changes.
+    /// Follows a change of the asymmetry by its effect along the injection axis; called once in two injection periods. `beyond` is the
+    /// squared injection current less its mean, divided by the expected one. It was measured with the injection along `axis`, which
+    /// rotates at `freq`, electrical turns per control period. If the axis does not rotate, this effect cannot be told from that of the
+    /// flux, and nothing changes.
     pub fn follow(&mut self, beyond: f32, axis: UnitVector, freq: f32) {
         let twice = axis.turned_by(axis);
         let step = beyond * limited(2.0 / TURNS * EVERY * freq.abs(), EVERY * PERIOD_S / LEAST_S);

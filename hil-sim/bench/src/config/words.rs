@@ -66,7 +66,7 @@ words! {
         Restless = "restless",
         /// A shaft that is driven through zero stator frequency under torque.
         Dragged = "dragged",
-        /// The same, with an asymmetry that arises after the start.
+        /// A shaft that is driven through zero stator frequency under torque. An asymmetry arises after the start.
         Arising = "arising",
     }
 

@@ -55,7 +55,12 @@ impl CurrentErrors {
     /// Begins with these currents of phases a and b, A.
     pub(super) fn rest(&mut self, [a, b]: [f64; 2]) {
         (self.before_b, self.behind_b) = (b, b);
-        self.now = [a + self.cross_talk[0] * b, b + self.cross_talk[1] * a];
+        self.now = self.crossed(a, b);
+    }
+
+    /// Adds the cross-talk to the currents of both channels, A.
+    fn crossed(&self, a: f64, b: f64) -> [f64; 2] {
+        [a + self.cross_talk[0] * b, b + self.cross_talk[1] * a]
     }
 
     /// Begins a period with this number of pulses; the middle is the middle of the last pulse.
@@ -81,7 +86,7 @@ impl CurrentErrors {
             self.before_b = b;
             seen_b = self.behind_b;
         }
-        self.now = [a + self.cross_talk[0] * seen_b, seen_b + self.cross_talk[1] * a];
+        self.now = self.crossed(a, seen_b);
         self.until_middle -= h;
         // The end of a step that is nearest to the middle.
         if self.until_middle.abs() <= 0.5 * h {

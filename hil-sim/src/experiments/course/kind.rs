@@ -40,7 +40,7 @@ pub enum Kind {
     /// Constant q-axis current while a dynamometer drives the shaft through zero stator frequency, into or out of
     /// generating. An asymmetry appears after the saliency self-commissioning.
     Dragged(Asymmetry),
-    /// The same with an asymmetry that arises after the start.
+    /// A shaft that is driven as in `Dragged`. The asymmetry arises 0.5 s after the start.
     Arising(Asymmetry),
     /// Constant q-axis currents of either sign, each while a dynamometer drives the shaft through zero stator frequency, there and back.
     Quadrants,

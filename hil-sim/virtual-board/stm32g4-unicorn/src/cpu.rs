@@ -391,7 +391,6 @@ fn stopped<C: Circuit>(uc: &mut Unicorn<Chip<C>>, address: u32) -> bool {
 
 impl Suspects {
     /// Whether the core was stopped at this address, because it begins with the state of a finished IT block.
-    #[inline(always)]
     fn stops_at<C: Circuit>(&self, uc: &mut Unicorn<Chip<C>>, address: u32) -> bool {
         let Some(left) = self.left.get().checked_sub(1) else { return false };
         self.left.set(left);
